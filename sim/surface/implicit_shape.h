@@ -1,0 +1,24 @@
+// Rigid implicit surfaces that skin can touch: gap, gradient and Hessian at a point, in the shape's own frame.
+#pragma once
+
+#include "sim/core/types.h"
+
+namespace rhytid {
+
+/// Second-order jet of the gap function g at a point x. g < 0 inside the rigid body.
+struct GapJet {
+  double gap = 0;                    ///< mm
+  Vec3 gradient = Vec3::Zero();      ///< ∂g/∂x, not necessarily of unit length (IMLS)
+  Mat3 hessian = Mat3::Zero();       ///< ∂²g/∂x², 1/mm
+  bool supported = true;             ///< false: outside the support of an IMLS surface; the other fields are zero
+};
+
+/// A rigid surface given by a gap function. Immutable, safe to share between threads.
+class ImplicitShape {
+ public:
+  virtual ~ImplicitShape() = default;
+  /// Jet at x (mm, in the shape's frame: the frame is moved by the collider that owns the shape).
+  virtual GapJet evaluate(const Vec3& x) const = 0;
+};
+
+}  // namespace rhytid
