@@ -1,0 +1,17 @@
+// The full program: simulate, track, fit, report.
+#include <iostream>
+
+#include "tools/all_verbs.h"
+#include "tools/environment.h"
+
+int main(int argc, char** argv) {
+  using namespace rhytid::tools;
+  Program program;
+  program.name = "rhytid";
+  program.description =
+      "Rhytid: a differentiable skin simulator that finds the retaining ligaments and moduli of a face from "
+      "video.";
+  program.verbs = make_all_verbs();
+  program.environment_checks = {fitting_environment};
+  return run_program(program, argc, argv, std::cout, std::cerr);
+}

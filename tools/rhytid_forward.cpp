@@ -1,0 +1,14 @@
+// The forward program: the verbs that need the simulator alone, without Ceres, NLopt, OpenCV and Embree.
+#include <iostream>
+
+#include "tools/forward_verbs.h"
+#include "tools/verb.h"
+
+int main(int argc, char** argv) {
+  using namespace rhytid::tools;
+  Program program;
+  program.name = "rhytid-forward";
+  program.description = "Rhytid, forward only: simulates skin that is pushed and dragged over bone.";
+  program.verbs = make_forward_verbs();
+  return run_program(program, argc, argv, std::cout, std::cerr);
+}

@@ -1,0 +1,18 @@
+#include "tools/threads.h"
+
+#include <omp.h>
+
+extern "C" void openblas_set_num_threads(int num_threads);
+
+namespace rhytid::tools {
+
+int available_threads() {
+  return omp_get_num_procs();
+}
+
+void use_threads(int n) {
+  omp_set_num_threads(n);
+  openblas_set_num_threads(n);
+}
+
+}  // namespace rhytid::tools

@@ -1,0 +1,14 @@
+// --threads: one number for OpenMP and OpenBLAS.
+#pragma once
+
+namespace rhytid::tools {
+
+inline constexpr int max_threads = 1024;  ///< sanity bound of --threads
+
+/// Cores this process may run on (affinity counted).
+int available_threads();
+
+/// Sets OpenMP and OpenBLAS to n threads, n in 1..max_threads.
+void use_threads(int n);
+
+}  // namespace rhytid::tools
