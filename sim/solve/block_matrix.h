@@ -11,7 +11,7 @@
 namespace rhytid {
 
 /// The sparsity of a mesh problem: which block rows couple (cliques), the fill-reducing order of the blocks
-/// (AMD below about 50 thousand blocks·3, METIS above), and where each clique's entries go. Immutable.
+/// (AMD; on large meshes the better of AMD and METIS), and where each clique's entries go. Immutable.
 class BlockPattern {
  public:
   /// cliques[c] lists the distinct block indices (0..num_blocks−1) that clique c couples. A block index of −1
@@ -37,8 +37,8 @@ class BlockMatrix {
  public:
   explicit BlockMatrix(const BlockPattern& pattern);
   void set_zero();
-  /// Adds a clique's dense symmetric matrix, [3m][3m] row-major, m = clique size, node-major xyz. Only the lower
-  /// triangle is read. Not thread-safe; called in a fixed order so that sums are deterministic.
+  /// Adds a clique's dense symmetric matrix, [3m][3m] row-major, m = clique size, node-major xyz. Only the
+  /// lower triangle is read. Not thread-safe; called in a fixed order so that sums are deterministic.
   void add(int clique, const double* dense);
   /// Turns unknown i (unpermuted index) into an identity row and column: entries zero, diagonal 1.
   void fix(int unknown);
@@ -54,18 +54,22 @@ class BlockMatrix {
   std::vector<double> values_;
 };
 
-/// Supernodal Cholesky of a BlockMatrix through CHOLMOD over OpenBLAS. Symbolic analysis once per pattern.
-/// Runs on no more threads than the process was asked to use.
+/// Supernodal Cholesky of a BlockMatrix through CHOLMOD over OpenBLAS. Symbolic analysis once per factor
+/// object; the pattern must outlive it. Runs on the calling thread alone, so that the factor does not depend
+/// on the number of threads. Throws std::bad_alloc or std::length_error when the factor does not fit.
 class CholeskyFactor {
  public:
   explicit CholeskyFactor(const BlockPattern& pattern);
   ~CholeskyFactor();
   CholeskyFactor(CholeskyFactor&&) noexcept;
-  /// Factorises A + shift·I. False when not positive definite (the factor is then unusable).
+  /// Factorises A + shift·I. False when not positive definite or not finite (the factor is then unusable).
   [[nodiscard]] bool factorize(const BlockMatrix& matrix, double shift = 0);
   bool usable() const;
-  /// Solves A X = B for [num_unknowns][k] right-hand sides, unpermuted order, one refinement step on request.
+  /// Solves A X = B for [num_unknowns][k] right-hand sides, unpermuted order. One factor serves one thread at
+  /// a time, also here (CHOLMOD's workspace is shared).
   MatrixXd solve(const MatrixXd& rhs) const;
+  /// The same with one step of iterative refinement against `matrix`, which must be the matrix factorised.
+  MatrixXd solve(const BlockMatrix& matrix, const MatrixXd& rhs) const;
   /// Smallest and largest diagonal of L², a cheap measure of how near to singular A is.
   double smallest_pivot() const;
   double largest_pivot() const;

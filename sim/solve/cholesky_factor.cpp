@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sim/core/error.h"
+#include "sim/solve/block_matrix.h"
+#include "sim/solve/block_pattern_impl.h"
+#include "sim/solve/cholmod_session.h"
+
+namespace rhytid {
+
+struct CholeskyFactor::Impl {
+  explicit Impl(const BlockPattern& p);
+  ~Impl() { cholmod_free_factor(&factor, &session); }
+
+  const BlockPattern* pattern;
+  // CHOLMOD writes its workspace and status into the session even when it only solves.
+  mutable CholmodSession session;
+  cholmod_sparse matrix{};  ///< a view of the pattern and of the values last factorised; owns nothing
+  cholmod_factor* factor = nullptr;
+  bool usable = false;
+  double smallest_pivot = 0, largest_pivot = 0;
+
+  void measure_pivots();
+};
+
+CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
+  const BlockPattern::Impl& impl = p.impl();
+  // Already in fill-reducing postorder: with the natural order and the lower triangle, CHOLMOD reads the
+  // values in place instead of permuting and transposing them at every factorisation.
+  session->nmethods = 1;
+  session->method[0].ordering = CHOLMOD_NATURAL;
+  session->postorder = 0;
+  session->supernodal = CHOLMOD_SUPERNODAL;
+  session->quick_return_if_not_posdef = 1;
+
+  matrix.nrow = matrix.ncol = static_cast<std::size_t>(p.num_unknowns());
+  matrix.nzmax = p.num_entries();
+  matrix.p = const_cast<int*>(impl.scalar_column_start.data());
+  matrix.i = const_cast<int*>(impl.scalar_rows.data());
+  matrix.stype = -1;
+  matrix.itype = CHOLMOD_INT;
+  matrix.xtype = CHOLMOD_PATTERN;
+  matrix.dtype = CHOLMOD_DOUBLE;
+  matrix.sorted = 1;
+  matrix.packed = 1;
+  const SingleThreadScope single_thread;
+  factor = cholmod_analyze(&matrix, &session);
+  matrix.xtype = CHOLMOD_REAL;
+  if (!factor) throw_on_cholmod_error(*&session);
+}
+
+void CholeskyFactor::Impl::measure_pivots() {
+  const int* super = static_cast<const int*>(factor->super);
+  const int* row_start = static_cast<const int*>(factor->pi);
+  const int* value_start = static_cast<const int*>(factor->px);
+  const double* x = static_cast<const double*>(factor->x);
+  double low = std::numeric_limits<double>::infinity(), high = 0;
+  bool finite = true;
+  for (std::size_t s = 0; s < factor->nsuper; ++s) {
+    const std::ptrdiff_t rows = row_start[s + 1] - row_start[s];
+    for (std::ptrdiff_t c = 0; c < super[s + 1] - super[s]; ++c) {
+      const double d = x[value_start[s] + c * (rows + 1)];
+      finite = finite && std::isfinite(d);
+      low = std::min(low, d);
+      high = std::max(high, d);
+    }
+  }
+  // LAPACK kernels let a NaN pivot through as if it were positive.
+  usable = finite && low > 0;
+  smallest_pivot = usable ? low * low : 0;
+  largest_pivot = usable ? high * high : 0;
+}
+
+CholeskyFactor::CholeskyFactor(const BlockPattern& pattern) : impl_(std::make_unique<Impl>(pattern)) {}
+CholeskyFactor::~CholeskyFactor() = default;
+CholeskyFactor::CholeskyFactor(CholeskyFactor&&) noexcept = default;
+
+bool CholeskyFactor::factorize(const BlockMatrix& matrix, double shift) {
+  Impl& impl = *impl_;
+  require(&matrix.pattern() == impl.pattern, "CholeskyFactor::factorize: the matrix has another pattern");
+  impl.usable = false;
+  impl.smallest_pivot = impl.largest_pivot = 0;
+  impl.matrix.x = const_cast<double*>(matrix.values().data());
+  double beta[2] = {shift, 0};
+  const SingleThreadScope single_thread;
+  impl.session->status = CHOLMOD_OK;
+  cholmod_factorize_p(&impl.matrix, beta, nullptr, 0, impl.factor, &impl.session);
+  throw_on_cholmod_error(*&impl.session);
+  if (impl.session->status == CHOLMOD_OK && impl.factor->minor == impl.factor->n) impl.measure_pivots();
+  return impl.usable;
+}
+
+bool CholeskyFactor::usable() const {
+  return impl_->usable;
+}
+
+MatrixXd CholeskyFactor::solve(const MatrixXd& rhs) const {
+  const Impl& impl = *impl_;
+  const BlockPattern::Impl& p = impl.pattern->impl();
+  require(impl.usable, "CholeskyFactor::solve: no usable factor");
+  require(rhs.rows() == 3 * p.num_blocks, "CholeskyFactor::solve: wrong number of rows");
+  if (rhs.cols() == 0) return rhs;
+  MatrixXd permuted(rhs.rows(), rhs.cols());
+  for (Eigen::Index k = 0; k < rhs.cols(); ++k)
+    for (int b = 0; b < p.num_blocks; ++b)
+      permuted.col(k).segment<3>(3 * p.position[b]) = rhs.col(k).segment<3>(3 * b);
+
+  cholmod_dense view{};
+  view.nrow = view.d = static_cast<std::size_t>(rhs.rows());
+  view.ncol = static_cast<std::size_t>(rhs.cols());
+  view.nzmax = view.nrow * view.ncol;
+  view.x = permuted.data();
+  view.xtype = CHOLMOD_REAL;
+  view.dtype = CHOLMOD_DOUBLE;
+  const SingleThreadScope single_thread;
+  impl.session->status = CHOLMOD_OK;
+  const auto release = [&](cholmod_dense* x) { cholmod_free_dense(&x, &impl.session); };
+  const std::unique_ptr<cholmod_dense, decltype(release)> solution(
+      cholmod_solve(CHOLMOD_LDLt, impl.factor, &view, &impl.session), release);
+  throw_on_cholmod_error(*&impl.session);
+
+  const Eigen::Map<const MatrixXd> x(static_cast<const double*>(solution->x), rhs.rows(), rhs.cols());
+  MatrixXd result(rhs.rows(), rhs.cols());
+  for (Eigen::Index k = 0; k < rhs.cols(); ++k)
+    for (int b = 0; b < p.num_blocks; ++b)
+      result.col(k).segment<3>(3 * b) = x.col(k).segment<3>(3 * p.position[b]);
+  return result;
+}
+
+MatrixXd CholeskyFactor::solve(const BlockMatrix& matrix, const MatrixXd& rhs) const {
+  MatrixXd x = solve(rhs), residual(rhs.rows(), rhs.cols());
+  for (Eigen::Index k = 0; k < rhs.cols(); ++k) residual.col(k) = rhs.col(k) - matrix.multiply(x.col(k));
+  return x + solve(residual);
+}
+
+double CholeskyFactor::smallest_pivot() const {
+  return impl_->smallest_pivot;
+}
+double CholeskyFactor::largest_pivot() const {
+  return impl_->largest_pivot;
+}
+std::size_t CholeskyFactor::factor_entries() const {
+  return impl_->factor->xsize;
+}
+
+}  // namespace rhytid

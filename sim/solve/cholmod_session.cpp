@@ -1,0 +1,35 @@
+#include "sim/solve/cholmod_session.h"
+
+#include <omp.h>
+
+#include <new>
+#include <stdexcept>
+#include <string>
+
+extern "C" {
+void openblas_set_num_threads(int count);
+int openblas_get_num_threads(void);
+}
+
+namespace rhytid {
+
+SingleThreadScope::SingleThreadScope()
+    : active_levels_(omp_get_max_active_levels()), blas_threads_(openblas_get_num_threads()) {
+  omp_set_max_active_levels(0);
+  if (blas_threads_ != 1) openblas_set_num_threads(1);
+}
+
+SingleThreadScope::~SingleThreadScope() {
+  omp_set_max_active_levels(active_levels_);
+  if (blas_threads_ != 1) openblas_set_num_threads(blas_threads_);
+}
+
+void throw_on_cholmod_error(const cholmod_common& common) {
+  if (common.status >= CHOLMOD_OK) return;
+  if (common.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
+  if (common.status == CHOLMOD_TOO_LARGE)
+    throw std::length_error("the factor is too large for 32-bit indices: use a coarser mesh");
+  throw std::runtime_error("CHOLMOD failed with status " + std::to_string(common.status));
+}
+
+}  // namespace rhytid

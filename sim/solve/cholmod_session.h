@@ -1,0 +1,46 @@
+// RAII around CHOLMOD's common object and around the threads that its calls may use. Internal to sim/solve.
+#pragma once
+
+#include <cholmod.h>
+
+namespace rhytid {
+
+/// Owns a cholmod_common: silent (no messages, no error handler), 32-bit indices. Not for use by two threads
+/// at once.
+class CholmodSession {
+ public:
+  CholmodSession() {
+    cholmod_start(&common_);
+    common_.print = 0;
+    common_.error_handler = nullptr;
+    common_.try_catch = 1;
+  }
+  ~CholmodSession() { cholmod_finish(&common_); }
+  CholmodSession(const CholmodSession&) = delete;
+  CholmodSession& operator=(const CholmodSession&) = delete;
+  cholmod_common* operator&() { return &common_; }
+  cholmod_common* operator->() { return &common_; }
+
+ private:
+  cholmod_common common_;
+};
+
+/// While alive, this thread's calls into CHOLMOD and OpenBLAS run on this thread alone. CHOLMOD 3's OpenMP
+/// regions carry a hard-coded num_threads(4), which the environment's thread count does not override; with no
+/// active level allowed, the OpenMP runtime runs them on the calling thread.
+class SingleThreadScope {
+ public:
+  SingleThreadScope();
+  ~SingleThreadScope();
+  SingleThreadScope(const SingleThreadScope&) = delete;
+  SingleThreadScope& operator=(const SingleThreadScope&) = delete;
+
+ private:
+  int active_levels_, blas_threads_;
+};
+
+/// Throws std::bad_alloc or std::length_error when CHOLMOD ran out of memory or of 32-bit indices, and
+/// std::runtime_error on any other failure of status < 0. Warnings (not positive definite) pass.
+void throw_on_cholmod_error(const cholmod_common& common);
+
+}  // namespace rhytid
