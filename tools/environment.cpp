@@ -1,7 +1,6 @@
 #include "tools/environment.h"
 
 #include <cholmod.h>
-#include <dlfcn.h>
 #include <link.h>
 #include <omp.h>
 #include <png.h>
@@ -14,12 +13,9 @@
 #include <set>
 
 #include "sim/core/build_info.h"
+#include "sim/solve/blas_info.h"
 
-extern "C" {
-char* openblas_get_config();
-char* openblas_get_corename();
-int openblas_get_num_threads();
-}
+extern "C" int openblas_get_num_threads();
 
 namespace rhytid::tools {
 namespace {
@@ -35,14 +31,6 @@ std::string join(const std::vector<std::string>& words, const char* between) {
 template <class... Numbers>
 std::string dotted(Numbers... numbers) {
   return join({std::to_string(numbers)...}, ".");
-}
-
-/// File of the shared library that answers a symbol for the whole process, empty when none does.
-std::string library_of(const char* symbol) {
-  Dl_info info = {};
-  void* address = dlsym(RTLD_DEFAULT, symbol);
-  if (address == nullptr || dladdr(address, &info) == 0 || info.dli_fname == nullptr) return "";
-  return std::filesystem::weakly_canonical(info.dli_fname).string();
 }
 
 /// Loaded libraries whose file name speaks of BLAS or LAPACK.
@@ -90,10 +78,9 @@ std::vector<EnvironmentFact> simulator_environment(int threads) {
   int cholmod_numbers[3] = {};
   cholmod_version(cholmod_numbers);
 
-  const std::string blas = library_of("dgemm_");
-  const bool is_openblas = blas.find("openblas") != std::string::npos;
-  // The C interface has OpenBLAS's own names: were it not loaded, the program would not have started.
-  std::vector<EnvironmentFact> facts = {
+  const BlasInfo blas = blas_info();
+  const Verdict blas_verdict = blas.name == "openblas" ? Verdict::good : Verdict::bad;
+  return {
       {"rhytid", build.version + ", " + build.build_type + ", " + build.compiler +
                      (build.sanitizers.empty() ? "" : ", sanitizers " + build.sanitizers)},
       {"system", std::string(system.sysname) + " " + system.release + " " + system.machine},
@@ -102,8 +89,8 @@ std::vector<EnvironmentFact> simulator_environment(int threads) {
       {"threads", std::to_string(threads) + " in use, " + std::to_string(omp_get_num_procs()) +
                       " cores, OpenMP " + std::to_string(_OPENMP) + ", OpenBLAS " +
                       std::to_string(openblas_get_num_threads())},
-      {"dgemm_ is answered by", blas.empty() ? "nobody" : blas, is_openblas ? Verdict::good : Verdict::bad},
-      {"OpenBLAS", std::string(openblas_get_config()) + ", kernels for " + openblas_get_corename()},
+      {"dgemm_ is answered by", blas.name + ", " + blas.library, blas_verdict},
+      {"BLAS configuration", blas.config.empty() ? "unknown" : blas.config},
       {"BLAS and LAPACK loaded", join(loaded_blas_libraries(), " ")},
       {"Eigen", dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
       {"CHOLMOD", dotted(cholmod_numbers[0], cholmod_numbers[1], cholmod_numbers[2])},
@@ -111,7 +98,6 @@ std::vector<EnvironmentFact> simulator_environment(int threads) {
        dotted(NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR, NLOHMANN_JSON_VERSION_PATCH)},
       {"libpng", png_get_libpng_ver(nullptr)},
   };
-  return facts;
 }
 
 }  // namespace rhytid::tools

@@ -2,6 +2,8 @@
 
 #include <omp.h>
 
+#include "sim/core/parallel.h"
+
 extern "C" void openblas_set_num_threads(int num_threads);
 
 namespace rhytid::tools {
@@ -11,7 +13,8 @@ int available_threads() {
 }
 
 void use_threads(int n) {
-  omp_set_num_threads(n);
+  set_num_threads(n);
+  omp_set_num_threads(n);  // Eigen and other users of OpenMP
   openblas_set_num_threads(n);
 }
 
