@@ -29,18 +29,18 @@ struct ElementLayer {
 };
 
 struct SkinMesh {
-  int order = 1;                                ///< p, in-plane Lagrange order
-  int num_columns = 0;                          ///< in-plane nodes
-  int num_levels = 0;                           ///< through-thickness nodes
-  int num_faces = 0;                            ///< triangles = elements per element layer
-  std::vector<int> face_columns;                ///< [num_faces][triangle nodes], TriangleBasis node order
-  std::vector<ElementLayer> element_layers;     ///< inner to outer
-  MatrixX3 rest;                                ///< [num_columns · num_levels][3] rest positions X, mm
-  MatrixX3 column_normals;                      ///< [num_columns][3] unit extrusion direction
-  std::vector<int> rim_columns;                 ///< columns on the boundary of the patch
-  MatrixX3 rim_directions;                      ///< [rim_columns][3] unit in-plane outward conormal there
-  std::vector<int> vertex_columns;              ///< column of each vertex of the input surface
-  TriangleSurface surface;                      ///< the input surface
+  int order = 1;                             ///< p, in-plane Lagrange order
+  int num_columns = 0;                       ///< in-plane nodes
+  int num_levels = 0;                        ///< through-thickness nodes
+  int num_faces = 0;                         ///< triangles = elements per element layer
+  std::vector<int> face_columns;             ///< [num_faces][triangle nodes], TriangleBasis node order
+  std::vector<ElementLayer> element_layers;  ///< inner to outer
+  MatrixX3 rest;                             ///< [num_columns · num_levels][3] rest positions X, mm
+  MatrixX3 column_normals;                   ///< [num_columns][3] unit extrusion direction
+  std::vector<int> rim_columns;              ///< columns on the boundary of the patch
+  MatrixX3 rim_directions;                   ///< [rim_columns][3] unit in-plane outward conormal there
+  std::vector<int> vertex_columns;           ///< column of each vertex of the input surface
+  TriangleSurface surface;                   ///< the input surface (vertices on the cylinder when bent)
 
   int num_nodes() const { return num_columns * num_levels; }
   int node(int column, int level) const { return column * num_levels + level; }
@@ -61,19 +61,23 @@ struct ExtrusionLayer {
   int order = 2;     ///< q of those elements (stacked only)
 };
 struct ExtrusionOptions {
-  int order = 3;                      ///< p
-  std::vector<ExtrusionLayer> layers; ///< inner to outer
-  bool composite = false;             ///< one element through all layers
-  int composite_order = 3;            ///< q of the composite element
-  bool surface_is_outer = true;       ///< the given surface is the outer one (else the inner one)
-  int normal_smoothing = 2;           ///< passes over the vertex normals
+  int order = 3;                       ///< p
+  std::vector<ExtrusionLayer> layers;  ///< inner to outer
+  bool composite = false;              ///< one element through all layers
+  int composite_order = 3;             ///< q of the composite element
+  bool surface_is_outer = true;        ///< the given surface is the outer one (else the inner one)
+  int normal_smoothing = 2;            ///< passes over the vertex normals
   /// Radius (mm) of a cylinder about the y axis onto which a flat grid is bent (0 = none): gives truly curved
   /// elements, every high-order node lies on the cylinder; outer normal points away from the axis.
   double bend_radius = 0;
 };
 
-/// Builds the prism mesh. Validates the surface first; throws InputError when the extrusion folds (J ≤ 0 at a
-/// node of some element), naming face numbers, the smallest thickness-to-curvature ratio and a hint.
+/// Builds the prism mesh. Columns: vertices of the surface first, then edge nodes, then face-interior nodes.
+/// Positions at high-order columns are interpolated linearly on the face (on the cylinder when bent), normals
+/// are interpolated and normalised; levels are spread evenly in each element layer. Material layers of a
+/// composite fill slabs of w in proportion to their thickness.
+/// Validates the surface first; throws InputError when the extrusion folds (J ≤ 0 at a node of some element),
+/// naming face numbers, the depth at which the first fold appears, and a hint.
 SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options);
 
 }  // namespace rhytid
