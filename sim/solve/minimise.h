@@ -1,5 +1,5 @@
-// The minimisers: Newton with projection on demand (default) and L-BFGS over a frozen factor (the publication's,
-// and ours), with a certificate that the result is a minimum.
+// The minimisers: Newton with projection on demand (default) and L-BFGS over a frozen factor (the
+// publication's, and ours), with a certificate that the result is a minimum.
 //
 // Source   DESIGN section 3; paper.tex "Non-Linear Solver".
 #pragma once
@@ -14,7 +14,7 @@
 namespace rhytid {
 
 enum class Minimiser {
-  newton,            ///< raw Hessian; per-point projected one for two iterations when it is not positive definite
+  newton,  ///< raw Hessian; per-point projected one for two iterations when it is not positive definite
   newton_projected,  ///< always projected (baseline)
   lbfgs,             ///< L-BFGS over a projected factor (publication: memory 10, refresh 50)
 };
@@ -26,32 +26,51 @@ struct MinimiserOptions {
   double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;
   int lbfgs_memory = 20;
-  int lbfgs_refresh = 20;       ///< iterations between factorisations
-  bool certify_minimum = true;  ///< require the raw Hessian to factor at the end; else leave along negative curvature
-  bool polish = false;          ///< one more raw Newton step after convergence (adjoint runs)
-  void validate() const;        ///< throws ContractError naming the field
+  int lbfgs_refresh = 20;  ///< iterations between factorisations
+  bool certify_minimum =
+      true;  ///< require the raw Hessian to factor at the end; else leave along negative curvature
+  /// One more raw Newton step after convergence, kept if it lowers the residual (adjoint runs). Skipped when
+  /// the raw Hessian does not factor and no certificate was asked for.
+  bool polish = false;
+  void validate() const;  ///< throws ContractError naming the field
 };
 
-enum class MinimiserStatus { converged, max_iterations, line_search_failed, not_a_minimum, not_finite, interrupted };
+enum class MinimiserStatus {
+  converged,
+  max_iterations,
+  line_search_failed,  ///< no direction gave a decrease, also not with a strongly shifted Hessian
+  not_a_minimum,       ///< the gradient test holds, the raw Hessian does not factor, and there is no way down
+  not_finite,          ///< energy, gradient or Hessian not finite at an accepted point (the start, mostly)
+  interrupted,         ///< by the callback
+  stagnated,  ///< the residual stays above the tolerance, yet the energy no longer resolves the steps
+};
+const char* name(Minimiser method);
 const char* name(MinimiserStatus status);
 
 struct MinimiserReport {
   MinimiserStatus status = MinimiserStatus::max_iterations;
-  int iterations = 0, evaluations = 0, factorisations = 0, failed_factorisations = 0, negative_curvature_exits = 0;
-  double energy = 0;           ///< mJ
-  double residual = 0;         ///< |gradient|₂, N
-  double tolerance = 0;        ///< N, what the residual was compared with
-  double smallest_pivot = 0;   ///< of the last raw factor; 0 when none
+  int iterations = 0;             ///< accepted steps, including those along negative curvature and the polish
+  int lbfgs_iterations = 0;       ///< of these, steps of L-BFGS
+  int evaluations = 0;            ///< of energy and gradient
+  int factorisations = 0;         ///< including the failed ones
+  int failed_factorisations = 0;  ///< not positive definite
+  int negative_curvature_exits = 0;
+  double energy = 0;          ///< mJ
+  double residual = 0;        ///< |gradient|₂, N
+  double tolerance = 0;       ///< N, what the residual was compared with
+  double smallest_pivot = 0;  ///< of the last raw factor; 0 when none
   double largest_pivot = 0;
-  std::vector<double> residuals;  ///< per iteration, N
+  std::vector<double> residuals;  ///< at the start and after every accepted step, N
   bool converged() const { return status == MinimiserStatus::converged; }
 };
 
-/// Called once per iteration; return false to stop (status interrupted).
+/// Called at the start (iteration 0) and after every accepted step; return false to stop (status interrupted,
+/// q is the last accepted point).
 using IterationCallback = std::function<bool(int iteration, double energy, double residual)>;
 
-/// Minimises from q (in/out). On return with status converged and certify_minimum, `factor` holds the raw Hessian's
-/// factor at (or one step before) the solution.
+/// Minimises from q (in/out). On return with status converged and certify_minimum, `factor` holds the raw
+/// Hessian's factor and `matrix` the raw Hessian, at the solution or, after a polish, one step before it.
+/// L-BFGS hands over to Newton when its gradient test holds (certificate) or when it can go no further.
 [[nodiscard]] MinimiserReport minimise(Objective& objective, VectorXd& q, const MinimiserOptions& options,
                                        CholeskyFactor& factor, BlockMatrix& matrix,
                                        const IterationCallback& callback = {});

@@ -6,16 +6,18 @@
 
 namespace rhytid {
 
-/// Which Hessian is wanted: the true one (certificate, adjoint), or one made positive semi-definite point by point.
+/// Which Hessian is wanted: the true one (certificate, adjoint), or one made positive semi-definite point by
+/// point.
 enum class Curvature { raw, projected };
 
-/// A twice differentiable energy of the block unknowns q [num_unknowns]. Fixed unknowns have zero gradient and
-/// identity rows in the Hessian, so a minimiser needs no notion of constraints.
+/// A twice differentiable energy of the block unknowns q [num_unknowns]. Fixed unknowns have zero gradient
+/// and identity rows in the Hessian, so a minimiser needs no notion of constraints.
 class Objective {
  public:
   virtual ~Objective() = default;
   virtual const BlockPattern& pattern() const = 0;
-  /// Energy [mJ] at q; +inf where it is not defined (J ≤ 0, overflow). Writes the gradient [N] when asked and finite.
+  /// Energy [mJ] at q; +inf where it is not defined (J ≤ 0, overflow). Writes the gradient [N] when asked and
+  /// finite.
   virtual double energy(const VectorXd& q, VectorXd* gradient) = 0;
   /// Sum over points of the absolute internal forces at the last gradient evaluation [N]: the scale against
   /// which the residual is judged.

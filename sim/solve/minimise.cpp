@@ -1,0 +1,330 @@
+#include "sim/solve/minimise.h"
+
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "sim/core/error.h"
+#include "sim/solve/lbfgs_memory.h"
+#include "sim/solve/line_search.h"
+#include "sim/solve/negative_curvature.h"
+
+namespace rhytid {
+
+namespace {
+
+constexpr int kProjectedIterations = 2;    // with the projected Hessian after a failed raw factorisation
+constexpr double kShift = 1e-9;            // added to the projected Hessian, relative to its largest diagonal
+constexpr double kLargestShift = 1e-2;     // where giving up starts
+constexpr int kMaxLineSearchFailures = 4;  // in a row, each with a more cautious direction
+constexpr int kMaxStagnantSteps = 5;       // below the energy's resolution without halving the residual
+constexpr int kMaxNegativeCurvatureExits = 10;
+constexpr double kLbfgsRefreshStep = 1e-6;  // paper.tex, "Non-Linear Solver"
+constexpr unsigned kNegativeCurvatureSeed = 20240229;
+
+class Minimisation {
+ public:
+  Minimisation(Objective& objective, VectorXd& q, const MinimiserOptions& options, CholeskyFactor& factor,
+               BlockMatrix& matrix, const IterationCallback& callback)
+      : objective_(objective),
+        q_(q),
+        options_(options),
+        factor_(factor),
+        matrix_(matrix),
+        callback_(callback) {}
+
+  MinimiserReport run();
+
+ private:
+  using Status = MinimiserStatus;
+
+  Status lbfgs_then_newton();
+  Status newton();
+  std::optional<Status> start();
+  /// Makes `next` the current point; interrupted or nothing.
+  std::optional<Status> accept(Iterate next);
+  std::optional<Status> note_iteration();
+  bool small() const { return report_.residual <= report_.tolerance; }
+  bool factor_raw();
+  bool factor_projected();
+  /// Why factor_projected failed.
+  Status no_projected_factor() const;
+  /// After an accepted step of the given slope: true when steps have sunk below the energy's resolution and
+  /// no longer reduce the residual.
+  bool stagnates(double slope, double noise);
+  void polish();
+  bool leave_along_negative_curvature(Iterate& next);
+
+  Objective& objective_;
+  VectorXd& q_;
+  const MinimiserOptions& options_;
+  CholeskyFactor& factor_;
+  BlockMatrix& matrix_;
+  const IterationCallback& callback_;
+
+  MinimiserReport report_;
+  Iterate at_;
+  double shift_ = kShift;
+  double stagnation_residual_ = 0;
+  int stagnant_steps_ = 0;
+};
+
+std::optional<MinimiserStatus> Minimisation::note_iteration() {
+  report_.energy = at_.energy;
+  report_.residual = at_.gradient.norm();
+  report_.tolerance = options_.relative_tolerance * objective_.force_scale() + options_.absolute_tolerance;
+  report_.residuals.push_back(report_.residual);
+  if (callback_ && !callback_(report_.iterations, report_.energy, report_.residual))
+    return Status::interrupted;
+  return std::nullopt;
+}
+
+std::optional<MinimiserStatus> Minimisation::start() {
+  at_ = evaluate(objective_, q_);
+  ++report_.evaluations;
+  if (!at_.finite()) {
+    report_.energy = at_.energy;
+    return Status::not_finite;
+  }
+  stagnation_residual_ = at_.gradient.norm();
+  return note_iteration();
+}
+
+std::optional<MinimiserStatus> Minimisation::accept(Iterate next) {
+  at_ = std::move(next);
+  ++report_.iterations;
+  return note_iteration();
+}
+
+bool Minimisation::factor_raw() {
+  objective_.hessian(at_.q, Curvature::raw, matrix_);
+  ++report_.factorisations;
+  const bool ok = factor_.factorize(matrix_);
+  if (!ok) ++report_.failed_factorisations;
+  report_.smallest_pivot = factor_.smallest_pivot();
+  report_.largest_pivot = factor_.largest_pivot();
+  return ok;
+}
+
+bool Minimisation::factor_projected() {
+  objective_.hessian(at_.q, Curvature::projected, matrix_);
+  const double scale = matrix_.diagonal_max();
+  for (; shift_ <= kLargestShift; shift_ *= 10) {
+    ++report_.factorisations;
+    if (factor_.factorize(matrix_, shift_ * scale)) return true;
+    ++report_.failed_factorisations;
+  }
+  return false;
+}
+
+MinimiserStatus Minimisation::no_projected_factor() const {
+  for (const double value : std::as_const(matrix_).values())
+    if (!std::isfinite(value)) return Status::not_finite;
+  return Status::line_search_failed;
+}
+
+bool Minimisation::stagnates(double slope, double noise) {
+  if (-slope > noise) {
+    stagnant_steps_ = 0;
+    stagnation_residual_ = report_.residual;
+    return false;
+  }
+  if (report_.residual < 0.5 * stagnation_residual_) {
+    stagnation_residual_ = report_.residual;
+    stagnant_steps_ = 0;
+    return false;
+  }
+  return ++stagnant_steps_ >= kMaxStagnantSteps;
+}
+
+void Minimisation::polish() {
+  Iterate next = evaluate(objective_, at_.q - VectorXd(factor_.solve(at_.gradient)));
+  ++report_.evaluations;
+  if (!next.finite() || !(next.gradient.norm() < report_.residual)) {
+    // The objective keeps data of its last evaluation (force scale): leave it at the point returned.
+    objective_.energy(at_.q, &at_.gradient);
+    ++report_.evaluations;
+    return;
+  }
+  at_ = std::move(next);
+  ++report_.iterations;
+  report_.energy = at_.energy;
+  report_.residual = at_.gradient.norm();
+  report_.residuals.push_back(report_.residual);
+}
+
+bool Minimisation::leave_along_negative_curvature(Iterate& next) {
+  std::mt19937 random(kNegativeCurvatureSeed + static_cast<unsigned>(report_.negative_curvature_exits));
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const VectorXd r = VectorXd::NullaryExpr(at_.q.size(), [&] { return uniform(random); });
+  if (!factor_projected()) return false;
+  VectorXd start = matrix_.multiply(r);
+  objective_.hessian(at_.q, Curvature::raw, matrix_);
+  start -= matrix_.multiply(r);
+  const std::optional<NegativeCurvature> found = find_negative_curvature(matrix_, factor_, start);
+  if (!found) return false;
+  VectorXd v = found->direction;
+  if (v.dot(at_.gradient) > 0) v = -v;
+
+  // The gradient says nothing about how far to go: start where the predicted decrease t²|θ|/2 just exceeds
+  // the energy's rounding, then double while that pays.
+  const double noise = energy_noise(objective_, at_);
+  const double limit = 0.9 * objective_.largest_feasible_step(at_.q, v);
+  double step = noise > 0 ? std::sqrt(20 * noise / -found->curvature) : 1e-9 / v.cwiseAbs().maxCoeff();
+  bool decreased = false;
+  for (int doubling = 0; doubling < 100 && step <= limit; ++doubling, step *= 2) {
+    Iterate trial = evaluate(objective_, at_.q + step * v);
+    ++report_.evaluations;
+    if (!trial.finite() || trial.energy > at_.energy + noise) break;
+    if (decreased && trial.energy >= next.energy) break;
+    if (trial.energy < at_.energy - noise) {
+      next = std::move(trial);
+      decreased = true;
+    }
+  }
+  return decreased;
+}
+
+MinimiserStatus Minimisation::newton() {
+  const bool always_projected = options_.method == Minimiser::newton_projected;
+  const bool wants_raw = options_.certify_minimum || options_.polish;
+  int projected_left = 0, failures = 0;
+  for (;;) {
+    if (small() && !wants_raw) return Status::converged;
+    const bool try_raw = small() || (!always_projected && projected_left == 0);
+    const bool raw = try_raw && factor_raw();
+    if (small()) {
+      if (raw && options_.polish) polish();
+      if (raw || !options_.certify_minimum) return Status::converged;
+      Iterate next;
+      if (report_.negative_curvature_exits >= kMaxNegativeCurvatureExits ||
+          !leave_along_negative_curvature(next))
+        return Status::not_a_minimum;
+      if (report_.iterations >= options_.max_iterations) return Status::max_iterations;
+      ++report_.negative_curvature_exits;
+      projected_left = failures = 0;
+      shift_ = kShift;
+      if (const auto stop = accept(std::move(next))) return *stop;
+      continue;
+    }
+    if (report_.iterations >= options_.max_iterations) return Status::max_iterations;
+    if (!raw) {
+      if (try_raw) projected_left = kProjectedIterations;
+      if (projected_left > 0) --projected_left;
+      if (!factor_projected()) return no_projected_factor();
+    }
+
+    const VectorXd direction = -factor_.solve(at_.gradient);
+    const double slope = at_.gradient.dot(direction), noise = energy_noise(objective_, at_);
+    LineSearchResult found;
+    if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
+    report_.evaluations += found.evaluations;
+    if (!found.accepted) {
+      if (std::abs(slope) <= noise) return Status::stagnated;
+      if (++failures >= kMaxLineSearchFailures) return Status::line_search_failed;
+      projected_left = kProjectedIterations;
+      if (!raw) shift_ *= 10;
+      continue;
+    }
+    failures = 0;
+    shift_ = kShift;
+    if (const auto stop = accept(std::move(found.next))) return *stop;
+    if (!small() && stagnates(slope, noise)) return Status::stagnated;
+  }
+}
+
+MinimiserStatus Minimisation::lbfgs_then_newton() {
+  LbfgsMemory memory(options_.lbfgs_memory);
+  int since_refresh = -1;  // no factor yet
+  while (!small()) {
+    if (report_.iterations >= options_.max_iterations) return Status::max_iterations;
+    if (since_refresh < 0 || since_refresh >= options_.lbfgs_refresh) {
+      if (!factor_projected()) return no_projected_factor();
+      shift_ = kShift;
+      memory.clear();
+      since_refresh = 0;
+    }
+    const VectorXd direction = memory.descent_direction(at_.gradient, factor_);
+    const double slope = at_.gradient.dot(direction), noise = energy_noise(objective_, at_);
+    LineSearchResult found;
+    if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
+    report_.evaluations += found.evaluations;
+    if (!found.accepted) {
+      if (since_refresh == 0) break;  // a fresh factor and no progress: over to Newton
+      since_refresh = -1;
+      continue;
+    }
+    memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);
+    since_refresh = found.step < kLbfgsRefreshStep ? -1 : since_refresh + 1;
+    ++report_.lbfgs_iterations;
+    if (const auto stop = accept(std::move(found.next))) return *stop;
+    if (!small() && stagnates(slope, noise)) break;
+  }
+  stagnant_steps_ = 0;
+  return newton();
+}
+
+MinimiserReport Minimisation::run() {
+  if (const auto stop = start()) {
+    report_.status = *stop;
+  } else {
+    report_.status = options_.method == Minimiser::lbfgs ? lbfgs_then_newton() : newton();
+    q_ = at_.q;
+  }
+  return std::move(report_);
+}
+
+}  // namespace
+
+void MinimiserOptions::validate() const {
+  require(relative_tolerance >= 0 && relative_tolerance < 1,
+          "MinimiserOptions: relative_tolerance must be in [0, 1)");
+  require(absolute_tolerance >= 0 && std::isfinite(absolute_tolerance),
+          "MinimiserOptions: absolute_tolerance must be non-negative and finite");
+  require(max_iterations >= 0, "MinimiserOptions: max_iterations must not be negative");
+  require(lbfgs_memory >= 1, "MinimiserOptions: lbfgs_memory must be at least 1");
+  require(lbfgs_refresh >= 1, "MinimiserOptions: lbfgs_refresh must be at least 1");
+}
+
+const char* name(Minimiser method) {
+  switch (method) {
+    case Minimiser::newton:
+      return "newton";
+    case Minimiser::newton_projected:
+      return "newton_projected";
+    case Minimiser::lbfgs:
+      return "lbfgs";
+  }
+  return "unknown";
+}
+
+const char* name(MinimiserStatus status) {
+  switch (status) {
+    case MinimiserStatus::converged:
+      return "converged";
+    case MinimiserStatus::max_iterations:
+      return "max_iterations";
+    case MinimiserStatus::line_search_failed:
+      return "line_search_failed";
+    case MinimiserStatus::not_a_minimum:
+      return "not_a_minimum";
+    case MinimiserStatus::not_finite:
+      return "not_finite";
+    case MinimiserStatus::interrupted:
+      return "interrupted";
+    case MinimiserStatus::stagnated:
+      return "stagnated";
+  }
+  return "unknown";
+}
+
+MinimiserReport minimise(Objective& objective, VectorXd& q, const MinimiserOptions& options,
+                         CholeskyFactor& factor, BlockMatrix& matrix, const IterationCallback& callback) {
+  options.validate();
+  require(&matrix.pattern() == &objective.pattern(),
+          "minimise: the matrix has another pattern than the objective");
+  require(q.size() == objective.pattern().num_unknowns(), "minimise: wrong number of unknowns");
+  return Minimisation(objective, q, options, factor, matrix, callback).run();
+}
+
+}  // namespace rhytid

@@ -1,0 +1,256 @@
+#include "sim/solve/minimise.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "sim/core/error.h"
+#include "tests/sim/solve/clique_objective.h"
+
+namespace rhytid {
+namespace {
+
+struct Outcome {
+  MinimiserReport report;
+  VectorXd q;
+  CholeskyFactor factor;
+  BlockMatrix matrix;
+};
+
+Outcome solve(Objective& objective, VectorXd q, const MinimiserOptions& options,
+              const IterationCallback& callback = {}) {
+  Outcome result{{}, std::move(q), CholeskyFactor(objective.pattern()), BlockMatrix(objective.pattern())};
+  result.report = minimise(objective, result.q, options, result.factor, result.matrix, callback);
+  return result;
+}
+
+VectorXd random_vector(int n, double low, double high) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(low, high);
+  return VectorXd::NullaryExpr(n, [&] { return uniform(random); });
+}
+
+constexpr Minimiser kAll[] = {Minimiser::newton, Minimiser::newton_projected, Minimiser::lbfgs};
+
+TEST(Minimise, ConvexQuadraticTakesOneNewtonStep) {
+  QuadraticChain objective(30);
+  const auto [report, q, factor, matrix] = solve(objective, random_vector(90, -1, 1), {});
+  EXPECT_TRUE(report.converged()) << name(report.status);
+  EXPECT_EQ(report.iterations, 1);
+  EXPECT_EQ(report.evaluations, 2);
+  EXPECT_EQ(report.factorisations, 2);  // one for the step, one as the certificate
+  EXPECT_EQ(report.residuals.size(), 2u);
+  EXPECT_EQ(report.evaluations, objective.evaluations);
+  EXPECT_EQ(report.factorisations, objective.raw_hessians);
+  EXPECT_EQ(objective.projected_hessians, 0);
+  EXPECT_GT(report.smallest_pivot, 0);
+  EXPECT_GT(report.largest_pivot, report.smallest_pivot);
+  EXPECT_LE((q - objective.solution()).norm(), 1e-9 * q.norm());
+}
+
+TEST(Minimise, AllMinimisersFindTheEndOfTheValley) {
+  for (const Minimiser method : kAll) {
+    RosenbrockChain objective(12);
+    MinimiserOptions options;
+    options.method = method;
+    options.max_iterations = 3000;
+    const auto [report, q, factor, matrix] = solve(objective, random_vector(36, 0, 0.9), options);
+    EXPECT_TRUE(report.converged()) << name(method) << ": " << name(report.status) << " after "
+                                    << report.iterations << ", residual " << report.residual;
+    EXPECT_LE((q - VectorXd::Ones(36)).cwiseAbs().maxCoeff(), 1e-8) << name(method);
+    EXPECT_LE(report.residual, report.tolerance);
+    EXPECT_LT(report.energy, 1e-15);
+    EXPECT_EQ(report.evaluations, objective.evaluations);
+    EXPECT_EQ(report.residuals.size(), static_cast<std::size_t>(report.iterations) + 1);
+    if (method == Minimiser::lbfgs) {
+      EXPECT_GT(report.lbfgs_iterations, 10);
+      EXPECT_LT(report.factorisations, report.iterations / 5) << "a factor must serve many steps";
+    } else {
+      EXPECT_EQ(report.lbfgs_iterations, 0);
+    }
+  }
+}
+
+TEST(Minimise, RawHessianConvergesQuadratically) {
+  RosenbrockChain objective(12);
+  MinimiserOptions options;
+  options.absolute_tolerance = 1e-9;
+  const MinimiserReport report = solve(objective, random_vector(36, 0.8, 1.2), options).report;
+  ASSERT_TRUE(report.converged());
+  const auto& r = report.residuals;
+  ASSERT_GE(r.size(), 4u);
+  EXPECT_LT(r.end()[-1], 1e-3 * r.end()[-2]);
+}
+
+TEST(Minimise, LeavesAnExactSaddle) {
+  for (const Minimiser method : kAll) {
+    DoubleWellChain objective(20);
+    objective.fixed = {3 * 7 + 1, 3 * 19 + 2};
+    MinimiserOptions options;
+    options.method = method;
+    const auto [report, q, factor, matrix] = solve(objective, VectorXd::Zero(60), options);
+    EXPECT_TRUE(report.converged()) << name(method) << ": " << name(report.status);
+    EXPECT_GE(report.negative_curvature_exits, 1);
+    EXPECT_LT(report.energy, 19 * 0.25 - 0.1);
+    EXPECT_GT(report.smallest_pivot, 0);
+    EXPECT_LT(report.residual, 1e-8);
+    for (int i = 0; i < 20; ++i) EXPECT_GT(std::abs(q[3 * i]), 0.05) << "block " << i;
+    for (const int k : objective.fixed) EXPECT_EQ(q[k], 0) << "a fixed unknown moved";
+  }
+}
+
+TEST(Minimise, WithoutCertificateASaddlePasses) {
+  DoubleWellChain objective(5);
+  MinimiserOptions options;
+  options.certify_minimum = false;
+  const MinimiserReport report = solve(objective, VectorXd::Zero(15), options).report;
+  EXPECT_TRUE(report.converged());
+  EXPECT_EQ(report.factorisations, 0);
+  options.polish = true;  // cannot: indefinite
+  EXPECT_EQ(solve(objective, VectorXd::Zero(15), options).report.iterations, 0);
+}
+
+TEST(Minimise, RefusesToCertifyAFlatMinimum) {
+  QuarticChain objective(4);
+  const MinimiserReport report = solve(objective, VectorXd::Zero(12), {}).report;
+  EXPECT_EQ(report.status, MinimiserStatus::not_a_minimum);
+  EXPECT_EQ(report.iterations, 0);
+  EXPECT_EQ(report.smallest_pivot, 0);
+}
+
+TEST(Minimise, StaysInsideTheDomain) {
+  for (const Minimiser method : kAll) {
+    for (const bool knows : {true, false}) {
+      BarrierChain objective(15);
+      objective.knows_its_domain = knows;
+      MinimiserOptions options;
+      options.method = method;
+      options.max_iterations = 1000;
+      const auto [report, q, factor, matrix] = solve(objective, random_vector(45, 3, 9), options);
+      EXPECT_TRUE(report.converged()) << name(method) << ": " << name(report.status);
+      EXPECT_LE((q - VectorXd::Ones(45)).cwiseAbs().maxCoeff(), 1e-8);
+      if (knows) {
+        EXPECT_GT(objective.lowest_seen, 0) << "evaluated beyond the largest feasible step";
+      } else if (method == Minimiser::newton) {
+        EXPECT_LE(objective.lowest_seen, 0) << "the test should have tried the other side";
+      }
+    }
+  }
+}
+
+TEST(Minimise, CertificateLeavesTheFactorOfTheRawHessian) {
+  for (const Minimiser method : kAll) {
+    DoubleWellChain objective(8);
+    MinimiserOptions options;
+    options.method = method;
+    const auto [report, q, factor, matrix] = solve(objective, random_vector(24, 0.2, 1), options);
+    ASSERT_TRUE(report.converged()) << name(method) << ": " << name(report.status);
+    BlockMatrix raw(objective.pattern());
+    objective.hessian(q, Curvature::raw, raw);
+    const VectorXd x = random_vector(24, -1, 1);
+    EXPECT_LE((VectorXd(factor.solve(raw.multiply(x))) - x).norm(), 1e-10);
+    EXPECT_EQ(matrix.multiply(x), raw.multiply(x));
+  }
+}
+
+TEST(Minimise, PolishLowersTheResidual) {
+  RosenbrockChain objective(6);
+  objective.scale = 1;
+  MinimiserOptions options;
+  options.relative_tolerance = 1e-3;
+  const VectorXd start = random_vector(18, 0.7, 1.1);
+  const MinimiserReport plain = solve(objective, start, options).report;
+  options.polish = true;
+  const MinimiserReport polished = solve(objective, start, options).report;
+  ASSERT_TRUE(plain.converged() && polished.converged());
+  EXPECT_EQ(polished.iterations, plain.iterations + 1);
+  EXPECT_EQ(polished.factorisations, plain.factorisations);
+  EXPECT_LT(polished.residual, 1e-2 * plain.residual);
+}
+
+TEST(Minimise, ToleranceFollowsTheForceScale) {
+  QuadraticChain objective(5);
+  objective.scale = 1e12;
+  MinimiserOptions options;
+  const MinimiserReport report = solve(objective, random_vector(15, -1, 1), options).report;
+  EXPECT_EQ(report.iterations, 0);
+  EXPECT_DOUBLE_EQ(report.tolerance, 1e12 * options.relative_tolerance + options.absolute_tolerance);
+}
+
+TEST(Minimise, SaysWhyItStopped) {
+  RosenbrockChain valley(12);
+  const VectorXd start = random_vector(36, 0, 0.9);
+  MinimiserOptions options;
+  options.max_iterations = 3;
+  for (const Minimiser method : kAll) {
+    options.method = method;
+    const Outcome short_run = solve(valley, start, options);
+    EXPECT_EQ(short_run.report.status, MinimiserStatus::max_iterations);
+    EXPECT_EQ(short_run.report.iterations, 3);
+    EXPECT_NE(short_run.q, start) << "the last point must be handed back";
+
+    std::vector<int> seen;
+    const Outcome stopped = solve(valley, start, options, [&](int iteration, double energy, double residual) {
+      seen.push_back(iteration);
+      EXPECT_TRUE(std::isfinite(energy) && residual > 0);
+      return iteration < 2;
+    });
+    EXPECT_EQ(stopped.report.status, MinimiserStatus::interrupted);
+    EXPECT_EQ(seen, (std::vector<int>{0, 1, 2}));
+    EXPECT_EQ(stopped.report.iterations, 2);
+    EXPECT_NE(stopped.q, start);
+  }
+  BarrierChain barrier(3);
+  EXPECT_EQ(solve(barrier, -VectorXd::Ones(9), {}).report.status, MinimiserStatus::not_finite);
+  EXPECT_EQ(solve(barrier, VectorXd::Constant(9, std::nan("")), {}).report.status,
+            MinimiserStatus::not_finite);
+}
+
+TEST(Minimise, StopsAtTheRoundingFloor) {
+  for (const Minimiser method : kAll) {
+    QuadraticChain objective(30);
+    objective.offset = 1e6;  // hides energy changes below 1e-5 or so
+    MinimiserOptions options;
+    options.method = method;
+    options.relative_tolerance = 0;
+    options.absolute_tolerance = 1e-300;
+    const MinimiserReport report = solve(objective, random_vector(90, -1, 1), options).report;
+    EXPECT_EQ(report.status, MinimiserStatus::stagnated) << name(method) << ": " << name(report.status);
+    EXPECT_LT(report.iterations, 40) << name(method);
+    EXPECT_LT(report.residual, 1e-10) << name(method);
+  }
+}
+
+TEST(Minimise, RepeatsToTheBit) {
+  for (const Minimiser method : kAll) {
+    DoubleWellChain objective(20);
+    MinimiserOptions options;
+    options.method = method;
+    CholeskyFactor factor(objective.pattern());
+    BlockMatrix matrix(objective.pattern());
+    VectorXd first = VectorXd::Zero(60), second = first;
+    ASSERT_TRUE(minimise(objective, first, options, factor, matrix).converged());
+    ASSERT_TRUE(minimise(objective, second, options, factor, matrix).converged());
+    EXPECT_EQ(first, second);
+  }
+}
+
+TEST(Minimise, RefusesBrokenOptions) {
+  QuadraticChain objective(3);
+  const auto broken = [&](auto change) {
+    MinimiserOptions options;
+    change(options);
+    EXPECT_THROW((void)solve(objective, VectorXd::Zero(9), options), ContractError);
+  };
+  broken([](MinimiserOptions& o) { o.relative_tolerance = -1; });
+  broken([](MinimiserOptions& o) { o.absolute_tolerance = std::nan(""); });
+  broken([](MinimiserOptions& o) { o.max_iterations = -1; });
+  broken([](MinimiserOptions& o) { o.lbfgs_memory = 0; });
+  broken([](MinimiserOptions& o) { o.lbfgs_refresh = 0; });
+  EXPECT_THROW((void)solve(objective, VectorXd::Zero(6), {}), ContractError);
+}
+
+}  // namespace
+}  // namespace rhytid
