@@ -1,0 +1,192 @@
+#include "sim/scene/load.h"
+
+#include <algorithm>
+
+#include "sim/scene/fields.h"
+#include "sim/scene/located_json.h"
+#include "sim/scene/names.h"
+#include "sim/scene/validate.h"
+
+namespace rhytid {
+namespace {
+
+using nlohmann::json;
+
+/// Millimetres per unit of the words that /skin/surface/unit may hold.
+double mm_per(const std::string& unit) {
+  if (unit == "cm") return 10;
+  if (unit == "m") return 1000;
+  return unit == "in" ? 25.4 : 1;
+}
+
+/// Archive (fields.h) that fills structs from validated JSON with all defaults in place.
+class Reader {
+ public:
+  explicit Reader(const json& source) : source_(source) {}
+
+  bool has(const char* key, bool) const { return source_.contains(key); }
+
+  template <class T>
+  void operator()(const char* key, T& member) {
+    if (source_.contains(key)) read(source_.at(key), member);
+  }
+  template <class F>
+  void group(const char* key, bool, F f) {
+    if (!source_.contains(key)) return;
+    Reader inner(source_.at(key));
+    f(inner);
+  }
+  void flag(const char* key, const char* word, const char*, bool& member) {
+    member = source_.at(key) == word;
+  }
+  void scale(const char* key, const char* unit_key, double& member) {
+    member = source_.contains(unit_key) ? mm_per(source_.at(unit_key)) : source_.at(key).get<double>();
+  }
+
+ private:
+  static void read(const json& value, double& member) { member = value.get<double>(); }
+  static void read(const json& value, int& member) { member = value.get<int>(); }
+  static void read(const json& value, bool& member) { member = value.get<bool>(); }
+  static void read(const json& value, std::string& member) { member = value.get<std::string>(); }
+  static void read(const json& value, Vec3& member) {
+    for (int i = 0; i < 3; ++i) member[i] = value.at(static_cast<size_t>(i)).get<double>();
+  }
+  template <class T, size_t n>
+  static void read(const json& value, std::array<T, n>& member) {
+    member = value.get<std::array<T, n>>();
+  }
+  template <class T>
+  static void read(const json& value, std::optional<T>& member) {
+    read(value, member.emplace());
+  }
+  template <class T>
+  static void read(const json& value, std::vector<T>& member) {
+    member.clear();
+    for (const json& item : value) read(item, member.emplace_back());
+  }
+  template <class T>
+  static void read(const json& value, T& member) {
+    if constexpr (std::is_enum_v<T>) {
+      const auto& words = EnumNames<T>::words;
+      const auto found = std::find(words.begin(), words.end(), value.get_ref<const std::string&>());
+      member = static_cast<T>(found - words.begin());
+    } else {
+      Reader inner(value);
+      fields(inner, member);
+    }
+  }
+
+  const json& source_;
+};
+
+/// Archive (fields.h) that writes structs to JSON.
+class Writer {
+ public:
+  bool has(const char*, bool is_present) const { return is_present; }
+
+  template <class T>
+  void operator()(const char* key, const T& member) {
+    if constexpr (requires { member.has_value(); }) {
+      if (member) target_[key] = written(*member);
+    } else {
+      target_[key] = written(member);
+    }
+  }
+  template <class F>
+  void group(const char* key, bool is_present, F f) {
+    if (!is_present) return;
+    Writer inner;
+    f(inner);
+    target_[key] = std::move(inner.target_);
+  }
+  void flag(const char* key, const char* yes, const char* no, bool member) {
+    target_[key] = member ? yes : no;
+  }
+  void scale(const char* key, const char*, double member) { target_[key] = member; }
+
+  const json& result() const { return target_; }
+
+ private:
+  template <class T>
+  static json written(const std::vector<T>& list) {
+    json items = json::array();
+    for (const T& item : list) items.push_back(written(item));
+    return items;
+  }
+  static json written(const Vec3& v) { return {v[0], v[1], v[2]}; }
+  template <class T>
+  static json written(const T& member) {
+    if constexpr (std::is_enum_v<T>) {
+      return to_string(member);
+    } else if constexpr (std::is_constructible_v<json, T>) {
+      return member;
+    } else {
+      Writer inner;
+      fields(inner, member);
+      return inner.target_;
+    }
+  }
+
+  json target_ = json::object();
+};
+
+Scene to_scene(const LocatedJson& located, const std::string& file) {
+  const LocatedJson resolved = resolve_against_rules(located);
+  check_consistency(resolved);
+  Scene scene;
+  Reader reader(resolved.json);
+  fields(reader, scene);
+  scene.file = file;
+  return scene;
+}
+
+LocatedJson load_located(const std::string& path, const std::vector<std::string>& overrides) {
+  LocatedJson scene = read_with_extends(path);
+  for (const std::string& assignment : overrides) apply_override(scene, assignment, path);
+  return scene;
+}
+
+LocatedJson without_lines(const json& value, const std::string& file) {
+  LocatedJson located{.json = value, .origin = {}};
+  if (!file.empty()) located.origin[""] = file;
+  return located;
+}
+
+}  // namespace
+
+json load_scene_json(const std::string& path, const std::vector<std::string>& overrides) {
+  return load_located(path, overrides).json;
+}
+
+Scene parse_scene(const json& value, const std::string& file) {
+  return to_scene(without_lines(value, file), file);
+}
+
+Scene parse_scene_text(std::string_view text, const std::string& file,
+                       const std::vector<std::string>& overrides) {
+  // Merging into an empty object removes nulls, as reading from a file does.
+  LocatedJson own = parse_located(text, file);
+  LocatedJson scene;
+  scene.json = json::object();
+  merge(scene, own);
+  for (const std::string& assignment : overrides) apply_override(scene, assignment, file);
+  return to_scene(scene, file);
+}
+
+Scene load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+  return to_scene(load_located(path, overrides), path);
+}
+
+json scene_with_defaults(const json& value) {
+  const LocatedJson resolved = resolve_against_rules(without_lines(value, ""));
+  check_consistency(resolved);
+  return resolved.json;
+}
+
+json scene_to_json(const Scene& scene) {
+  Writer writer;
+  fields(writer, scene);
+  return writer.result();
+}
+
+}  // namespace rhytid

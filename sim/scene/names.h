@@ -1,0 +1,46 @@
+// The words that scene files use for enumerations, in the order of the enumerators.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sim/scene/scene.h"
+
+namespace rhytid {
+
+/// words[i] is the name of enumerator i. Specialised for every enumeration that a scene file can hold.
+template <class Enum>
+struct EnumNames;
+template <>
+struct EnumNames<DamperScheme> {
+  static constexpr std::array<std::string_view, 5> words{"exponential", "literal", "strang", "backward_euler",
+                                                         "none"};
+};
+template <>
+struct EnumNames<RimCondition> {
+  static constexpr std::array<std::string_view, 3> words{"clamped", "sliding", "free"};
+};
+template <>
+struct EnumNames<ThicknessScheme> {
+  static constexpr std::array<std::string_view, 2> words{"stacked", "composite"};
+};
+template <>
+struct EnumNames<ShapeKind> {
+  static constexpr std::array<std::string_view, 3> words{"sphere", "plane", "imls"};
+};
+
+/// The word for a value: "exponential", "clamped", ...
+template <class Enum>
+std::string to_string(Enum value) {
+  return std::string(EnumNames<Enum>::words[static_cast<size_t>(value)]);
+}
+
+/// All words of an enumeration.
+template <class Enum>
+std::vector<std::string> enum_words() {
+  return {EnumNames<Enum>::words.begin(), EnumNames<Enum>::words.end()};
+}
+
+}  // namespace rhytid

@@ -1,0 +1,122 @@
+#include "sim/scene/rules.h"
+
+#include <charconv>
+#include <cmath>
+
+namespace rhytid {
+namespace {
+
+void insert(RuleNode& root, const Rule& rule) {
+  RuleNode* node = &root;
+  for (size_t begin = 1; begin <= rule.pointer.size();) {
+    const size_t end = std::min(rule.pointer.find('/', begin), rule.pointer.size());
+    const std::string key = rule.pointer.substr(begin, end - begin);
+    if (const RuleNode* found = node->child(key)) {
+      node = const_cast<RuleNode*>(found);
+    } else {
+      node->children.emplace_back(key, RuleNode{});
+      node = &node->children.back().second;
+    }
+    begin = end + 1;
+  }
+  node->rule = &rule;
+}
+
+/// Shortest text that reads back as the same double: "0.49999", "1e-10", "10000".
+std::string number_text(double value) {
+  if (value == std::floor(value) && std::abs(value) < 1e15)
+    return std::to_string(static_cast<long long>(value));
+  char buffer[32];
+  const auto [end, status] = std::to_chars(buffer, buffer + sizeof(buffer), value);
+  return {buffer, end};
+}
+
+std::string join(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "\"" : ", \"") + word + "\"";
+  return text;
+}
+
+}  // namespace
+
+const RuleNode* RuleNode::child(std::string_view key) const {
+  for (const auto& [name, node] : children)
+    if (name == key) return &node;
+  return nullptr;
+}
+
+bool RuleNode::is_named_list() const {
+  const RuleNode* item = child("*");
+  return item != nullptr && item->child("name") != nullptr;
+}
+
+const RuleNode& scene_rule_tree() {
+  static const RuleNode root = [] {
+    RuleNode node;
+    for (const Rule& rule : scene_rules()) insert(node, rule);
+    return node;
+  }();
+  return root;
+}
+
+const Rule* find_rule(std::string_view pattern) {
+  for (const Rule& rule : scene_rules())
+    if (rule.pointer == pattern) return &rule;
+  return nullptr;
+}
+
+bool is_in_range(const Rule& rule, double value) {
+  const bool above = rule.min_is_open ? value > rule.min : value >= rule.min;
+  const bool below = rule.max_is_open ? value < rule.max : value <= rule.max;
+  return above && below;
+}
+
+std::string range_text(const Rule& rule) {
+  const std::string unit = unit_text(rule.dimension).empty() ? "" : " " + unit_text(rule.dimension);
+  const bool has_min = std::isfinite(rule.min), has_max = std::isfinite(rule.max);
+  const std::string min = number_text(has_min ? rule.min : 0), max = number_text(has_max ? rule.max : 0);
+  if (has_min && has_max && !rule.min_is_open && !rule.max_is_open)
+    return "from " + min + " to " + max + unit;
+  std::string text;
+  if (has_min) text += (rule.min_is_open ? "> " : ">= ") + min + unit;
+  if (has_max)
+    text += (text.empty() ? "" : " and ") + std::string(rule.max_is_open ? "< " : "<= ") + max + unit;
+  return text;
+}
+
+std::string expectation(const Rule& rule) {
+  const std::string range = range_text(rule).empty() ? "" : " " + range_text(rule);
+  const std::string unit =
+      unit_text(rule.dimension).empty() ? "" : " (plain numbers in " + unit_text(rule.dimension) + ")";
+  const bool is_plain = rule.dimension == dimension::none;
+  switch (rule.type) {
+    case RuleType::object:
+      return "an object {...}";
+    case RuleType::array:
+      return rule.min > 0 ? "a list of at least " + number_text(rule.min) + " item" : "a list [...]";
+    case RuleType::number:
+      if (is_plain) return "a number" + range;
+      return dimension_text(rule.dimension) + range + ", e.g. \"" + dimension_example(rule.dimension) + "\"";
+    case RuleType::integer:
+      return "an integer" + range;
+    case RuleType::string:
+      return "a string";
+    case RuleType::name:
+      return "a name (a string, not only digits, without / ~ = and control characters)";
+    case RuleType::path:
+      return "the path of a file";
+    case RuleType::boolean:
+      return "true or false";
+    case RuleType::option:
+      return "one of " + join(rule.options);
+    case RuleType::vector2:
+      return "a list of 2 numbers" + (range.empty() ? unit : range);
+    case RuleType::vector3:
+      return "a list of 3 numbers" + (range.empty() ? unit : range);
+    case RuleType::integers2:
+      return "a list of 2 integers" + range;
+  }
+  return "";
+}
+
+}  // namespace rhytid

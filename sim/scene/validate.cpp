@@ -1,0 +1,241 @@
+#include "sim/scene/validate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "sim/core/error.h"
+#include "sim/scene/nearest.h"
+#include "sim/scene/rules.h"
+
+namespace rhytid {
+namespace {
+
+using nlohmann::json;
+
+/// Where a value stands: by numbers, to look up its origin; by names, to be read and used in --set.
+struct Place {
+  std::string pointer, shown;
+
+  Place key(const std::string& key) const {
+    return {pointer + "/" + escape_key(key), shown + "/" + escape_key(key)};
+  }
+  Place item(size_t index, const std::string& name) const {
+    const std::string number = std::to_string(index);
+    return {pointer + "/" + number, shown + "/" + (name.empty() ? number : escape_key(name))};
+  }
+};
+
+bool is_name(const std::string& text) {
+  if (text.empty() || text.size() > 200) return false;
+  const bool has_bad = std::any_of(text.begin(), text.end(), [](unsigned char c) {
+    return c < 0x20 || c == 0x7f || c == '/' || c == '~' || c == '=';
+  });
+  return !has_bad && !std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// Name of a list item for messages, or "".
+std::string item_name(const json& item) {
+  if (!item.is_object() || !item.contains("name") || !item["name"].is_string()) return "";
+  const std::string name = item["name"];
+  return is_name(name) ? name : "";
+}
+
+class Resolver {
+ public:
+  explicit Resolver(const LocatedJson& scene) : scene_(scene) {}
+
+  json resolve(const RuleNode& node, const json& value, const Place& place) const {
+    const Rule& rule = *node.rule;
+    switch (rule.type) {
+      case RuleType::object:
+        return object(node, value, place);
+      case RuleType::array:
+        return array(node, value, place);
+      case RuleType::number:
+        return number(rule, value, place);
+      case RuleType::integer:
+        return integer(rule, value, place);
+      case RuleType::boolean:
+        if (!value.is_boolean()) refuse(rule, value, place);
+        return value;
+      case RuleType::option:
+        if (!value.is_string() || std::find(rule.options.begin(), rule.options.end(),
+                                            value.get<std::string>()) == rule.options.end())
+          refuse(rule, value, place);
+        return value;
+      case RuleType::name:
+        if (!value.is_string() || !is_name(value.get_ref<const std::string&>())) refuse(rule, value, place);
+        return value;
+      case RuleType::path:
+        if (!value.is_string() || value.get_ref<const std::string&>().empty()) refuse(rule, value, place);
+        return value;
+      case RuleType::string:
+        if (!value.is_string()) refuse(rule, value, place);
+        return value;
+      case RuleType::vector2:
+      case RuleType::vector3:
+        return vector(rule, value, place);
+      case RuleType::integers2:
+        return vector(rule, value, place);
+    }
+    return value;
+  }
+
+ private:
+  std::string where(const Place& place) const {
+    const std::string origin = scene_.where(place.pointer);
+    const std::string shown = place.shown.empty() ? "/" : place.shown;
+    return origin.empty() ? shown : origin + ": " + shown;
+  }
+
+  [[noreturn]] void refuse(const Rule& rule, const json& value, const Place& place) const {
+    throw InputError(where(place), shown_json(value), expectation(rule));
+  }
+
+  json object(const RuleNode& node, const json& value, const Place& place) const {
+    if (!value.is_object()) refuse(*node.rule, value, place);
+    for (const auto& [key, item] : value.items())
+      if (node.child(key) == nullptr) refuse_key(node, key, place);
+    json result = json::object();
+    for (const auto& [key, child] : node.children) {
+      const Rule& rule = *child.rule;
+      const bool is_given = value.contains(key);
+      const bool rival_given = !rule.rival.empty() && value.contains(rule.rival);
+      if (is_given && rival_given)
+        throw InputError(where(place.key(key)), "both \"" + key + "\" and \"" + rule.rival + "\"",
+                         "one of the two");
+      if (!is_given && !rival_given && rule.needs_one_of_pair)
+        throw InputError(where(place), "neither \"" + key + "\" nor \"" + rule.rival + "\"",
+                         "one of the two");
+      const bool has_meaning = rule.needs.empty() || value.contains(rule.needs);
+      if (is_given && !has_meaning)
+        throw InputError(where(place.key(key)), shown_json(value[key]),
+                         "nothing, since it only has a meaning together with \"" + rule.needs + "\"");
+      if (is_given)
+        result[key] = resolve(child, value[key], place.key(key));
+      else if (rule.is_required)
+        throw InputError(where(place.key(key)), "nothing", expectation(rule) + " (required)");
+      else if (!rule.fallback.is_null() && has_meaning && !rival_given)
+        result[key] = resolve(child, rule.fallback, place.key(key));
+    }
+    return result;
+  }
+
+  [[noreturn]] void refuse_key(const RuleNode& node, const std::string& key, const Place& place) const {
+    if (place.pointer.empty() && key == "extends")
+      throw InputError(where(place.key(key)), "extends", "a scene that has been read from its file");
+    std::vector<std::string> known;
+    for (const auto& child : node.children) known.push_back(child.first);
+    throw InputError(where(place.key(key)), "the unknown key " + shown_json(key),
+                     "a known key, nearest is \"" + nearest_word(key, known) + "\"");
+  }
+
+  json array(const RuleNode& node, const json& value, const Place& place) const {
+    const Rule& rule = *node.rule;
+    if (!value.is_array()) refuse(rule, value, place);
+    if (!is_in_range(rule, static_cast<double>(value.size()))) refuse(rule, value, place);
+    const RuleNode& item = *node.child("*");
+    json result = json::array();
+    for (size_t i = 0; i < value.size(); ++i)
+      result.push_back(
+          resolve(item, value[i], place.item(i, node.is_named_list() ? item_name(value[i]) : "")));
+    return result;
+  }
+
+  double number(const Rule& rule, const json& value, const Place& place) const {
+    double result = 0;
+    if (value.is_number())
+      result = value.get<double>();
+    else if (value.is_string())
+      result = parse_quantity(value.get_ref<const std::string&>(), rule.dimension, where(place));
+    else
+      refuse(rule, value, place);
+    if (!std::isfinite(result) || !is_in_range(rule, result)) refuse(rule, value, place);
+    return result;
+  }
+
+  /// Any rule on an integer has bounds that fit an int, or none; without bounds int's own range holds.
+  int integer(const Rule& rule, const json& value, const Place& place) const {
+    if (!value.is_number()) refuse(rule, value, place);
+    const double number = value.get<double>();
+    if (number != std::floor(number) || std::abs(number) > 2147483647.0 || !is_in_range(rule, number))
+      refuse(rule, value, place);
+    return static_cast<int>(number);
+  }
+
+  json vector(const Rule& rule, const json& value, const Place& place) const {
+    const size_t size = rule.type == RuleType::vector3 ? 3 : 2;
+    if (!value.is_array() || value.size() != size) refuse(rule, value, place);
+    json result = json::array();
+    for (size_t i = 0; i < size; ++i) {
+      const Place at = place.item(i, "");
+      if (rule.type == RuleType::integers2)
+        result.push_back(integer(rule, value[i], at));
+      else
+        result.push_back(number(rule, value[i], at));
+    }
+    return result;
+  }
+
+  const LocatedJson& scene_;
+};
+
+void require_unique_names(const LocatedJson& scene, const json& list, const std::string& pointer) {
+  std::set<std::string> seen;
+  for (size_t i = 0; i < list.size(); ++i)
+    if (!seen.insert(list[i]["name"].get<std::string>()).second) {
+      const std::string at = pointer + "/" + std::to_string(i) + "/name";
+      throw InputError(scene.where(at) + ": " + at, shown_json(list[i]["name"]) + " a second time",
+                       "a name of its own for each item");
+    }
+}
+
+void require_direction(const LocatedJson& scene, const json& holder, const std::string& pointer) {
+  const json& normal = holder["normal"];
+  double largest = 0;
+  for (const json& component : normal) largest = std::max(largest, std::abs(component.get<double>()));
+  // Beyond these sizes the squared length would leave the range of a double.
+  if (largest < 1e-100 || largest > 1e100)
+    throw InputError(scene.where(pointer + "/normal") + ": " + pointer + "/normal", shown_json(normal),
+                     "a vector that is not zero");
+}
+
+}  // namespace
+
+LocatedJson resolve_against_rules(const LocatedJson& scene) {
+  const Resolver resolver(scene);
+  return {.json = resolver.resolve(scene_rule_tree(), scene.json, Place{}), .origin = scene.origin};
+}
+
+void check_consistency(const LocatedJson& scene) {
+  const json& root = scene.json;
+  require_unique_names(scene, root["skin"]["layers"], "/skin/layers");
+  if (root.contains("ligaments"))
+    require_unique_names(scene, root["ligaments"]["sources"], "/ligaments/sources");
+  require_unique_names(scene, root["colliders"], "/colliders");
+
+  if (root.contains("base")) {
+    const json& base = root["base"];
+    require_direction(scene, base, "/base");
+    if (base["shape"] == "sphere" && base["radius"].get<double>() <= 0)
+      throw InputError(scene.where("/base/radius") + ": /base/radius", shown_json(base["radius"]),
+                       "a length > 0 mm, since the base is a sphere");
+  }
+  for (size_t i = 0; i < root["colliders"].size(); ++i) {
+    const json& collider = root["colliders"][i];
+    require_direction(scene, collider, "/colliders/" + std::to_string(i));
+    const json& path = collider["path"];
+    for (size_t k = 1; k < path.size(); ++k)
+      if (path[k]["time"].get<double>() <= path[k - 1]["time"].get<double>()) {
+        const std::string number = "/path/" + std::to_string(k) + "/time";
+        throw InputError(
+            scene.where("/colliders/" + std::to_string(i) + number) + ": /colliders/" +
+                escape_key(collider["name"].get<std::string>()) + number,
+            shown_json(path[k]["time"]),
+            "a time later than that of the knot before, " + shown_json(path[k - 1]["time"]) + " s");
+      }
+  }
+}
+
+}  // namespace rhytid
