@@ -36,11 +36,11 @@ struct Rule {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
   bool min_is_open = false, max_is_open = false;  ///< the bound itself is refused
-  std::vector<std::string> options;               ///< of RuleType::option
-  std::string rival;               ///< sibling key that must not be given together with this one
+  std::vector<std::string> options{};             ///< of RuleType::option
+  std::string rival{};             ///< sibling key that must not be given together with this one
   bool needs_one_of_pair = false;  ///< exactly one of this key and its rival must be given
-  std::string needs;               ///< sibling key without which this one has no meaning
-  std::string doc;
+  std::string needs{};             ///< sibling key without which this one has no meaning
+  std::string doc{};
 };
 
 /// All rules, parents before children, in the order of the documentation. The root has the pointer "".
