@@ -1,0 +1,166 @@
+#include "sim/scene/parameter.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+
+#include "sim/core/error.h"
+#include "sim/scene/located_json.h"
+#include "sim/scene/nearest.h"
+#include "sim/scene/rules.h"
+
+namespace rhytid {
+namespace {
+
+/// A kind of parameter. `member` is null when item i of this scene does not have it (no friction, a plane's
+/// radius); i is the index for the * of the pattern and unused without one.
+struct Kind {
+  const char* pattern;
+  double lower, upper;
+  ParameterTransform transform;
+  double* (*member)(Scene&, size_t i);
+};
+
+using enum ParameterTransform;
+
+// Bounds are wide physical ranges of skin; a fit usually narrows them.
+const Kind kinds[] = {
+    {"/skin/layers/*/youngs_modulus", 1e-4, 1e3, log,
+     [](Scene& s, size_t i) { return &s.skin.layers[i].youngs_modulus; }},
+    {"/skin/layers/*/poissons_ratio", 0, 0.4999, logit,
+     [](Scene& s, size_t i) { return &s.skin.layers[i].poissons_ratio; }},
+    {"/skin/layers/*/stiffening", 0.25, 100, log,
+     [](Scene& s, size_t i) { return &s.skin.layers[i].stiffening; }},
+    {"/skin/layers/*/relaxing_fraction", 0, 0.999, logit,
+     [](Scene& s, size_t i) { return &s.skin.layers[i].relaxing_fraction; }},
+    {"/skin/layers/*/relaxation_time", 1e-3, 1e2, log,
+     [](Scene& s, size_t i) { return &s.skin.layers[i].relaxation_time; }},
+    {"/ligaments/stiffness", 1e-7, 1, log,
+     [](Scene& s, size_t) { return s.ligaments ? &s.ligaments->stiffness : nullptr; }},
+    {"/ligaments/diffusion_time", 1e-2, 1e5, log,
+     [](Scene& s, size_t) { return s.ligaments ? &s.ligaments->diffusion_time : nullptr; }},
+    {"/ligaments/sources/*/strength", 1e-3, 1e2, log,
+     [](Scene& s, size_t i) { return &s.ligaments->sources[i].strength; }},
+    {"/base/stiffness", 1e-3, 1e3, log,
+     [](Scene& s, size_t) { return s.base ? &s.base->stiffness : nullptr; }},
+    {"/colliders/*/radius", 0.1, 100, log,
+     [](Scene& s, size_t i) {
+       return s.colliders[i].shape == ShapeKind::sphere ? &s.colliders[i].radius : nullptr;
+     }},
+    {"/colliders/*/stiffness", 1e-3, 1e3, log, [](Scene& s, size_t i) { return &s.colliders[i].stiffness; }},
+    {"/colliders/*/friction/coefficient", 1e-3, 5, log,
+     [](Scene& s, size_t i) {
+       return s.colliders[i].friction ? &s.colliders[i].friction->coefficient : nullptr;
+     }},
+};
+
+/// Names of the items that the * of a pattern runs over; a pattern without * has one nameless item.
+std::vector<std::string> item_names(const Scene& scene, std::string_view pattern) {
+  std::vector<std::string> names;
+  const auto collect = [&names](const auto& items) {
+    for (const auto& item : items) names.push_back(item.name);
+  };
+  if (pattern.find('*') == std::string_view::npos)
+    names.emplace_back();
+  else if (pattern.starts_with("/skin/layers/"))
+    collect(scene.skin.layers);
+  else if (pattern.starts_with("/colliders/"))
+    collect(scene.colliders);
+  else if (scene.ligaments)
+    collect(scene.ligaments->sources);
+  return names;
+}
+
+struct Found {
+  const Kind* kind = nullptr;
+  size_t item = 0;
+  std::string address;  ///< by names
+  std::string name;
+};
+
+std::string filled(std::string pattern, const std::string& item) {
+  const size_t star = pattern.find('*');
+  return star == std::string::npos ? pattern : pattern.replace(star, 1, escape_key(item));
+}
+
+/// "film youngs_modulus", "ligaments stiffness", "finger friction coefficient".
+std::string short_name(const std::string& address, bool has_item) {
+  const std::vector<std::string> keys = split_pointer(address, address);
+  size_t first = 0;
+  if (has_item) first = keys[0] == "colliders" ? 1 : 2;
+  std::string name;
+  for (size_t i = first; i < keys.size(); ++i) name += (name.empty() ? "" : " ") + keys[i];
+  return name;
+}
+
+/// The members are only read through the returned pointers when the scene is const.
+std::vector<Found> find_all(const Scene& scene) {
+  std::vector<Found> all;
+  for (const Kind& kind : kinds) {
+    const std::vector<std::string> names = item_names(scene, kind.pattern);
+    for (size_t i = 0; i < names.size(); ++i) {
+      if (kind.member(const_cast<Scene&>(scene), i) == nullptr) continue;
+      const std::string address = filled(kind.pattern, names[i]);
+      all.push_back({&kind, i, address, short_name(address, !names[i].empty())});
+    }
+  }
+  return all;
+}
+
+Found find(const Scene& scene, std::string_view address) {
+  const std::vector<Found> all = find_all(scene);
+  std::vector<std::string> addresses;
+  for (const Found& found : all) {
+    if (found.address == address || filled(found.kind->pattern, std::to_string(found.item)) == address)
+      return found;
+    addresses.push_back(found.address);
+  }
+  const std::string file = scene.file.empty() ? "" : scene.file + ": ";
+  const std::string nearest = nearest_word(address, addresses);
+  throw InputError(file + "parameter address", shown_json(std::string(address)),
+                   nearest.empty() ? "a scene with parameters" : "a fit-able scalar, nearest is " + nearest);
+}
+
+ParameterSpec describe(const Scene& scene, const Found& found) {
+  const Dimension dimension = find_rule(found.kind->pattern)->dimension;
+  return {.address = found.address,
+          .name = found.name,
+          .unit = unit_text(dimension),
+          .dimension = dimension,
+          .lower = found.kind->lower,
+          .upper = found.kind->upper,
+          .transform = found.kind->transform,
+          .value = *found.kind->member(const_cast<Scene&>(scene), found.item)};
+}
+
+}  // namespace
+
+ParameterSpec describe_parameter(const Scene& scene, std::string_view address) {
+  return describe(scene, find(scene, address));
+}
+
+std::vector<ParameterSpec> all_parameters(const Scene& scene) {
+  std::vector<ParameterSpec> specs;
+  for (const Found& found : find_all(scene)) specs.push_back(describe(scene, found));
+  return specs;
+}
+
+double get_parameter(const Scene& scene, std::string_view address) {
+  const Found found = find(scene, address);
+  return *found.kind->member(const_cast<Scene&>(scene), found.item);
+}
+
+void set_parameter(Scene& scene, std::string_view address, double value) {
+  const Found found = find(scene, address);
+  const Rule& rule = *find_rule(found.kind->pattern);
+  if (!std::isfinite(value) || !is_in_range(rule, value)) {
+    char text[32];
+    std::snprintf(text, sizeof(text), "%.10g", value);
+    const std::string file = scene.file.empty() ? "" : scene.file + ": ";
+    throw InputError(file + found.address, text, expectation(rule));
+  }
+  *found.kind->member(scene, found.item) = value;
+}
+
+}  // namespace rhytid

@@ -1,0 +1,97 @@
+// What is allowed but doubtful (load.h: scene_warnings).
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "sim/core/units.h"
+#include "sim/scene/load.h"
+
+namespace rhytid {
+namespace {
+
+/// Text of numbers at four digits.
+template <class... Parts>
+std::string sentence(const Parts&... parts) {
+  std::ostringstream text;
+  text.precision(4);
+  (text << ... << parts);
+  return text.str();
+}
+
+std::string length_text(double mm) {
+  return format_quantity(mm, dimension::length);
+}
+std::string time_text(double s) {
+  return format_quantity(s, dimension::time);
+}
+
+void warn_of_layer(const LayerScene& layer, const Scene& scene, std::vector<std::string>& warnings) {
+  const std::string at = "/skin/layers/" + layer.name;
+  if (layer.stiffening < 0.25)
+    warnings.push_back(sentence(at, "/stiffening: ", layer.stiffening,
+                                " is below 0.25, where the energy loses convexity at moderate stretch"));
+  const bool relaxes = layer.relaxing_fraction > 0 && scene.time.damper != DamperScheme::none;
+  const double frame = 1 / scene.time.frame_rate, ratio = frame / layer.relaxation_time;
+  if (relaxes && scene.time.frames > 0 && (ratio < 0.05 || ratio > 5))
+    warnings.push_back(sentence(at, "/relaxation_time: frame interval / relaxation time = ", ratio,
+                                " is outside 0.05..5, so that the relaxation time (",
+                                time_text(layer.relaxation_time),
+                                ") can hardly be identified from frames every ", time_text(frame)));
+  const double step = ratio / scene.time.substeps;
+  if (relaxes && scene.time.frames > 0 && scene.time.damper == DamperScheme::literal && step > 0.1)
+    warnings.push_back(sentence("/time/damper: literal is first order and the step is ", step,
+                                " relaxation times of layer ", layer.name, "; exponential is second order"));
+  if (scene.skin.scheme == ThicknessScheme::composite && layer.elements > 1)
+    warnings.push_back(
+        sentence(at, "/elements: ", layer.elements,
+                 " is not used, since the composite scheme has one element through all layers"));
+}
+
+/// A film on a soft layer needs cubic thickness order below (20 % against 1 % of error in the onset strain).
+void warn_of_wrinkling_stack(const SkinScene& skin, std::vector<std::string>& warnings) {
+  for (size_t i = 0; i + 1 < skin.layers.size(); ++i) {
+    const LayerScene &soft = skin.layers[i], &film = skin.layers[i + 1];
+    if (skin.scheme == ThicknessScheme::stacked && film.youngs_modulus > 10 * soft.youngs_modulus &&
+        soft.order < 3 && soft.elements == 1)
+      warnings.push_back(sentence("/skin/layers/", soft.name, "/order: ", soft.order, " under the stiffer ",
+                                  film.name, " delays wrinkling by up to 20 %; 3 is within 1 %"));
+  }
+  if (skin.scheme == ThicknessScheme::composite && skin.composite_order < 3 && skin.layers.size() > 1)
+    warnings.push_back(sentence("/skin/composite_order: ", skin.composite_order,
+                                " through several layers delays wrinkling 3 to 9 times; take 3 or 4"));
+}
+
+void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
+                      std::vector<std::string>& warnings) {
+  const std::string at = "/colliders/" + collider.name;
+  const double end = time.frames / time.frame_rate, step = 1 / (time.frame_rate * time.substeps);
+  if (time.frames > 0 && collider.path.front().time > end)
+    warnings.push_back(sentence(at, "/path: starts at ", time_text(collider.path.front().time),
+                                ", after the last frame at ", time_text(end), ", so that it never moves"));
+  if (!collider.friction || collider.shape != ShapeKind::sphere) return;
+  // Lagged friction is only good while the contact moves by less than a quarter of its radius in a step, and
+  // the contact is smaller than the sphere.
+  double fastest = 0;
+  for (size_t k = 1; k < collider.path.size(); ++k) {
+    const PathKnot &a = collider.path[k - 1], &b = collider.path[k];
+    if (a.time >= end || b.time <= 0) continue;
+    const double distance = (b.position - a.position).norm();
+    fastest = std::max(fastest, distance * std::min(1., step / (b.time - a.time)));
+  }
+  if (fastest > collider.radius / 4)
+    warnings.push_back(sentence(
+        at, "/path: moves ", length_text(fastest), " in one step, more than a quarter of its radius ",
+        length_text(collider.radius), ", so that lagged friction is inaccurate; raise /time/substeps"));
+}
+
+}  // namespace
+
+std::vector<std::string> scene_warnings(const Scene& scene) {
+  std::vector<std::string> warnings;
+  for (const LayerScene& layer : scene.skin.layers) warn_of_layer(layer, scene, warnings);
+  warn_of_wrinkling_stack(scene.skin, warnings);
+  for (const ColliderScene& collider : scene.colliders) warn_of_collider(collider, scene.time, warnings);
+  return warnings;
+}
+
+}  // namespace rhytid
