@@ -1,4 +1,5 @@
-// Rigid implicit surfaces that skin can touch: gap, gradient and Hessian at a point, in the shape's own frame.
+// Rigid implicit surfaces that skin can touch: gap, gradient and Hessian at a point, in the shape's own
+// frame.
 #pragma once
 
 #include "sim/core/types.h"
@@ -7,10 +8,10 @@ namespace rhytid {
 
 /// Second-order jet of the gap function g at a point x. g < 0 inside the rigid body.
 struct GapJet {
-  double gap = 0;                    ///< mm
-  Vec3 gradient = Vec3::Zero();      ///< ∂g/∂x, not necessarily of unit length (IMLS)
-  Mat3 hessian = Mat3::Zero();       ///< ∂²g/∂x², 1/mm
-  bool supported = true;             ///< false: outside the support of an IMLS surface; the other fields are zero
+  double gap = 0;                ///< mm
+  Vec3 gradient = Vec3::Zero();  ///< ∂g/∂x, not necessarily of unit length (IMLS)
+  Mat3 hessian = Mat3::Zero();   ///< ∂²g/∂x², 1/mm
+  bool supported = true;         ///< false: outside the support of an IMLS surface; the other fields are zero
 };
 
 /// A rigid surface given by a gap function. Immutable, safe to share between threads.
@@ -19,6 +20,9 @@ class ImplicitShape {
   virtual ~ImplicitShape() = default;
   /// Jet at x (mm, in the shape's frame: the frame is moved by the collider that owns the shape).
   virtual GapJet evaluate(const Vec3& x) const = 0;
+  /// ∂g/∂R for a shape whose size is one radius R; 0 for a shape without one. It does not depend on x, so
+  /// ∂(∇g)/∂R = 0: changing the radius only offsets the level sets (sphere, capsule).
+  virtual double gap_by_radius() const { return 0; }
 };
 
 }  // namespace rhytid

@@ -1,0 +1,246 @@
+#include "sim/surface/imls.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nanoflann.hpp>
+
+#include "sim/core/error.h"
+
+namespace rhytid {
+namespace {
+
+// The search radius is widened by more than the rounding of a squared distance, so that the tree never loses
+// a point that the sum (which computes the distance itself) would count.
+constexpr double kSearchSlack = 1 + 1e-10;
+
+struct PointCloud {
+  const MatrixX3& points;
+  std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(points.rows()); }
+  double kdtree_get_pt(int i, std::size_t k) const { return points(i, static_cast<Eigen::Index>(k)); }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointCloud>, PointCloud, 3, int>;
+
+/// nanoflann result set: all indices within a squared radius, unordered.
+struct IndicesWithin {
+  double squared_radius;
+  std::vector<int>& found;
+  void init() { found.clear(); }
+  std::size_t size() const { return found.size(); }
+  bool full() const { return true; }
+  double worstDist() const { return squared_radius; }
+  bool addPoint(double squared_distance, int index) {
+    if (squared_distance < squared_radius) found.push_back(index);
+    return true;
+  }
+};
+
+/// θ, and a, c with ∇θ = a d, ∇²θ = a I + c d dᵀ.
+struct KernelJet {
+  double theta, a, c;
+};
+
+struct SmoothKernel {
+  double inverse_h2;
+  bool supports(double d2) const { return d2 * inverse_h2 < 1; }
+  KernelJet operator()(double d2) const {
+    const double u = 1 - d2 * inverse_h2;
+    const double u2 = u * u;
+    return {u2 * u2, -8 * u2 * u * inverse_h2, 48 * u2 * inverse_h2 * inverse_h2};
+  }
+};
+
+struct LiteralKernel {
+  double inverse_h, epsilon2;
+  bool supports(double d2) const { return std::sqrt(d2 + epsilon2) * inverse_h < 1; }
+  KernelJet operator()(double d2) const {
+    const double e = std::sqrt(d2 + epsilon2);  // ≥ ε > 0
+    const double v = 1 - e * inverse_h;
+    const double v2 = v * v;
+    const double a = -4 * v2 * v * inverse_h / e;
+    return {v2 * v2, a, 4 * v2 * inverse_h * (3 * inverse_h + v / e) / (e * e)};
+  }
+};
+
+/// One pass over the candidates. Signed distances are taken relative to the first one in support, σ = s − s₀,
+/// so that the differences sᵢ − g lose nothing (on a plane σ is round-off and all curvature vanishes with
+/// it). No underflow to guard against: 1 − q ≥ 2⁻⁵³ inside the support, hence W ≥ 2⁻²¹².
+template <JetOrder order, class Samples, class Kernel>
+GapJet imls_sum(const Samples& samples, const std::vector<int>& candidates, const Vec3& x,
+                const Kernel& kernel) {
+  constexpr bool want_gradient = order != JetOrder::gap;
+  constexpr bool want_hessian = order == JetOrder::hessian;
+  double s0 = 0, w = 0, w_sigma = 0;            // Σ θ, Σ θ σ
+  double a_sum = 0, a_sigma = 0;                // Σ a, Σ a σ
+  Vec3 w_n = Vec3::Zero();                      // Σ θ n
+  Vec3 dw = Vec3::Zero(), dw_s = Vec3::Zero();  // Σ ∇θ, Σ σ ∇θ
+  Mat3 cross = Mat3::Zero();                    // Σ ∇θ nᵀ
+  Mat3 cc = Mat3::Zero(), cc_s = Mat3::Zero();  // Σ c d dᵀ, Σ σ c d dᵀ
+  bool supported = false;
+  for (const int i : candidates) {
+    const Vec3 d = x - samples[static_cast<std::size_t>(i)].point;
+    const double d2 = d.squaredNorm();
+    if (!kernel.supports(d2)) continue;
+    const Vec3& n = samples[static_cast<std::size_t>(i)].normal;
+    const double s = n.dot(d);
+    if (!supported) s0 = s;
+    supported = true;
+    const double sigma = s - s0;
+    const KernelJet k = kernel(d2);
+    w += k.theta;
+    w_sigma += k.theta * sigma;
+    if constexpr (want_gradient) {
+      const Vec3 d_theta = k.a * d;
+      w_n += k.theta * n;
+      dw += d_theta;
+      dw_s += sigma * d_theta;
+      if constexpr (want_hessian) {
+        a_sum += k.a;
+        a_sigma += k.a * sigma;
+        cross += d_theta * n.transpose();
+        const Mat3 dd = k.c * Mat3(d * d.transpose());  // in this order it is symmetric to the bit
+        cc += dd;
+        cc_s += sigma * dd;
+      }
+    }
+  }
+  GapJet jet;
+  jet.supported = supported;
+  if (!supported) return jet;
+  const double gamma = w_sigma / w;  // g − s₀
+  jet.gap = s0 + gamma;
+  if constexpr (want_gradient) jet.gradient = (w_n + dw_s - gamma * dw) / w;
+  if constexpr (want_hessian) {
+    const Mat3 half = cross - dw * jet.gradient.transpose();
+    jet.hessian = (half + half.transpose() + cc_s - gamma * cc) / w;
+    jet.hessian.diagonal().array() += (a_sigma - gamma * a_sum) / w;
+  }
+  return jet;
+}
+
+template <class Samples, class Kernel>
+GapJet imls_sum(const Samples& samples, const std::vector<int>& candidates, const Vec3& x,
+                const Kernel& kernel, JetOrder order) {
+  switch (order) {
+    case JetOrder::gap:
+      return imls_sum<JetOrder::gap>(samples, candidates, x, kernel);
+    case JetOrder::gradient:
+      return imls_sum<JetOrder::gradient>(samples, candidates, x, kernel);
+    case JetOrder::hessian:
+      break;
+  }
+  return imls_sum<JetOrder::hessian>(samples, candidates, x, kernel);
+}
+
+}  // namespace
+
+class ImlsSurface::Tree {
+ public:
+  explicit Tree(const MatrixX3& points) : points_(points), cloud_{points_}, index_(3, cloud_) {
+    index_.buildIndex();
+  }
+  void within(const Vec3& x, double radius, std::vector<int>* found) const {
+    IndicesWithin result{radius * radius, *found};
+    result.init();
+    index_.findNeighbors(result, x.data(), nanoflann::SearchParams());
+  }
+
+ private:
+  MatrixX3 points_;
+  PointCloud cloud_;
+  KdTree index_;
+};
+
+ImlsSurface::ImlsSurface(const MatrixX3& points, const MatrixX3& normals, const ImlsOptions& options)
+    : kernel_(options.kernel) {
+  require(points.rows() > 0, "ImlsSurface: no points");
+  require(points.rows() == normals.rows(), "ImlsSurface: one normal per point is needed");
+  require(points.allFinite() && normals.allFinite(), "ImlsSurface: points and normals must be finite");
+  require(options.support >= 0 && std::isfinite(options.support),
+          "ImlsSurface: support must be finite and positive (0 = default)");
+  support_ = options.support > 0 ? options.support : default_imls_support(points);
+  require(options.literal_epsilon >= 0 && options.literal_epsilon < support_,
+          "ImlsSurface: epsilon of the literal kernel must lie in [0, support)");
+  epsilon_ = options.literal_epsilon > 0 ? options.literal_epsilon : 1e-3 * support_;
+  samples_.reserve(static_cast<std::size_t>(points.rows()));
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const Vec3 normal = normals.row(i).transpose();
+    const double length = normal.stableNorm();
+    require(length > 0, "ImlsSurface: a normal has length zero");
+    samples_.push_back({points.row(i).transpose(), normal / length});
+  }
+  tree_ = std::make_unique<const Tree>(points);
+}
+
+ImlsSurface::~ImlsSurface() = default;
+
+void ImlsSurface::search(const Vec3& x, double radius, std::vector<int>* found) const {
+  tree_->within(x, radius * kSearchSlack, found);
+  // The order of summation is part of the result: ascending index, however the points were found.
+  std::sort(found->begin(), found->end());
+}
+
+GapJet ImlsSurface::sum(const Vec3& x, const std::vector<int>& candidates, JetOrder order) const {
+  if (kernel_ == ImlsKernel::smooth)
+    return imls_sum(samples_, candidates, x, SmoothKernel{1 / (support_ * support_)}, order);
+  return imls_sum(samples_, candidates, x, LiteralKernel{1 / support_, epsilon_ * epsilon_}, order);
+}
+
+GapJet ImlsSurface::evaluate(const Vec3& x, JetOrder order) const {
+  thread_local std::vector<int> found;  // scratch only: emptied by every search
+  search(x, support_, &found);
+  return sum(x, found, order);
+}
+
+ImlsSurface::Neighbours ImlsSurface::neighbours(const Vec3& x, double reach) const {
+  require(reach >= 0, "ImlsSurface: reach of a neighbour list must be >= 0");
+  Neighbours near;
+  near.centre_ = x;
+  near.reach_ = reach;
+  search(x, support_ + reach, &near.points_);
+  near.points_.shrink_to_fit();
+  return near;
+}
+
+bool ImlsSurface::covers(const Neighbours& near, const Vec3& x) {
+  return near.reach_ >= 0 && (x - near.centre_).squaredNorm() <= near.reach_ * near.reach_;
+}
+
+GapJet ImlsSurface::evaluate(const Vec3& x, const Neighbours& near, JetOrder order) const {
+  return covers(near, x) ? sum(x, near.points_, order) : evaluate(x, order);
+}
+
+double default_imls_support(const MatrixX3& points) {
+  require(points.rows() >= 2, "default_imls_support: needs at least two points");
+  const PointCloud cloud{points};
+  KdTree index(3, cloud);
+  index.buildIndex();
+  const double size = (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
+  // Seams repeat points; a neighbour counts once it is further away than rounding. Eight are enough for any
+  // seam.
+  constexpr std::size_t kNearest = 8;
+  std::vector<double> spacing;
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    std::array<int, kNearest> neighbour{};
+    std::array<double, kNearest> squared{};
+    const std::size_t found =
+        index.knnSearch(points.row(i).data(), kNearest, neighbour.data(), squared.data());
+    for (std::size_t k = 0; k < found; ++k) {
+      if (std::sqrt(squared[k]) <= 1e-9 * size) continue;
+      spacing.push_back(std::sqrt(squared[k]));
+      break;
+    }
+  }
+  require(!spacing.empty(), "default_imls_support: all points coincide");
+  const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
+  std::nth_element(spacing.begin(), middle, spacing.end());
+  return 3 * *middle;
+}
+
+}  // namespace rhytid

@@ -1,0 +1,69 @@
+#include "sim/surface/project_to_surface.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sim/core/error.h"
+
+namespace rhytid {
+namespace {
+
+/// Barycentric coordinates of the closest point of the triangle a, b, c to x.
+Vec3 closest_barycentric(const std::array<Vec3, 3>& corner, const Vec3& x) {
+  const Vec3 u = corner[1] - corner[0], v = corner[2] - corner[0], d = x - corner[0];
+  const Vec3 normal = u.cross(v);
+  const double n2 = normal.squaredNorm();
+  // Interior: the foot of the perpendicular. A sliver whose area is round-off of its edges has no normal.
+  if (n2 > 1e-28 * u.squaredNorm() * v.squaredNorm()) {
+    const double beta = d.cross(v).dot(normal) / n2, gamma = u.cross(d).dot(normal) / n2;
+    if (beta >= 0 && gamma >= 0 && beta + gamma <= 1) return {1 - beta - gamma, beta, gamma};
+  }
+  Vec3 best = Vec3::Zero();
+  double best_d2 = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const int next = (k + 1) % 3;
+    const Vec3& from = corner[static_cast<std::size_t>(k)];
+    const Vec3 edge = corner[static_cast<std::size_t>(next)] - from;
+    const double length2 = edge.squaredNorm();
+    const double s = length2 > 0 ? std::clamp(edge.dot(x - from) / length2, 0.0, 1.0) : 0.0;
+    const double d2 = (from + s * edge - x).squaredNorm();
+    if (d2 >= best_d2) continue;
+    best_d2 = d2;
+    best.setZero();
+    best[k] = 1 - s;
+    best[next] = s;
+  }
+  return best;
+}
+
+}  // namespace
+
+SurfacePoint project_to_surface(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                                const Vec3& position) {
+  require(!triangles.empty(), "project_to_surface: no triangles");
+  require(position.allFinite() && nodes.allFinite(), "project_to_surface: coordinates must be finite");
+  SurfacePoint best;
+  best.distance = std::numeric_limits<double>::infinity();
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    std::array<Vec3, 3> corner;
+    for (std::size_t k = 0; k < 3; ++k) {
+      require(triangles[t][k] >= 0 && triangles[t][k] < nodes.rows(),
+              "project_to_surface: triangle index out of range");
+      corner[k] = nodes.row(triangles[t][k]).transpose();
+    }
+    const Vec3 low = corner[0].cwiseMin(corner[1]).cwiseMin(corner[2]);
+    const Vec3 high = corner[0].cwiseMax(corner[1]).cwiseMax(corner[2]);
+    const double box_distance = (low - position).cwiseMax(position - high).cwiseMax(0.0).norm();
+    if (box_distance >= best.distance) continue;
+    const Vec3 weights = closest_barycentric(corner, position);
+    const Vec3 point = weights[0] * corner[0] + weights[1] * corner[1] + weights[2] * corner[2];
+    const double distance = (point - position).norm();
+    if (distance >= best.distance) continue;
+    best = {static_cast<int>(t), weights, point, distance};
+  }
+  return best;
+}
+
+}  // namespace rhytid

@@ -1,0 +1,24 @@
+// Closest point of a triangle mesh: where a source given as a point in space sits on the surface.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "sim/core/types.h"
+
+namespace rhytid {
+
+struct SurfacePoint {
+  int triangle = -1;                ///< index into the triangles
+  Vec3 barycentric = Vec3::Zero();  ///< weights of its three corners, ≥ 0, sum 1
+  Vec3 point = Vec3::Zero();        ///< mm
+  double distance = 0;              ///< |point − position|, mm
+};
+
+/// Closest point to `position` (mm) on the triangles; ties go to the lowest triangle index. nodes [n][3] mm.
+/// Degenerate triangles count as their edges. Brute force with box rejection, O(triangles) per call. Throws
+/// ContractError when there is no triangle, an index is out of range or something is not finite.
+SurfacePoint project_to_surface(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                                const Vec3& position);
+
+}  // namespace rhytid
