@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "sim/core/types.h"
+#include "sim/scene/damper_scheme.h"
 
 namespace rhytid {
 
-enum class DamperScheme { exponential, literal, strang, backward_euler, none };
+
 enum class RimCondition { clamped, sliding, free };
 enum class ThicknessScheme { stacked, composite };
 enum class ShapeKind { sphere, plane, imls };

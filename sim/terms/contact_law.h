@@ -1,0 +1,164 @@
+// Penalty contact of a surface point with a rigid implicit shape, and the friction lagged from it; per area.
+//
+//   contact   Ψ = κ φ(d), d = g₀ − g(x):  d³/(3ε) below ε, ε²/3 + ε(d−ε) + (d−ε)² above (C², κ g² for ε → 0)
+//   friction  Ψ = μ f_n D(|u_T|; ε_v dt), u_T = (I − n nᵀ)(u − u_old − (c − c_old)); f_n, n from the last converged step
+//             quintic   D = δ⁶/ε⁵ − 3δ⁵/ε⁴ + 5δ⁴/(2ε³) | δ − ε/2 ;  quadratic (IPC)  δ²/ε − δ³/(3ε²) | δ − ε/3
+//
+// The shape gives value, gradient and Hessian of its gap in plain numbers; other scalars are lifted through them, so a
+// new shape needs nothing here. `inflation` [mm] is the amount by which the radius differs from the shape's own.
+//
+// Source   paper.tex "Contact", "Friction"; deviations: κ in MPa/mm, C² onset, rest gap g₀ subtracted on the base,
+//          friction on the displacement of the step (the velocity form as printed is 1/dt too strong).
+// Units    κ [MPa/mm], ε [mm], f_n [MPa], u, c [mm], ε_v [mm/s].
+// Shapes   contact θ = κ, inflation, c [3]; friction θ = κ, inflation, μ, c [3], c_old [3]; lag = f_n, n [3].
+//          rest = X [3], g₀.
+// Smooth   contact C² (ε > 0) or C¹; friction C² (quintic) or C¹ (quadratic).
+// Tests    tests/sim/terms/contact_law_test.cpp
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "sim/math/dual.h"
+#include "sim/surface/implicit_shape.h"
+
+namespace rhytid {
+inline namespace RHYTID_ISA {
+
+/// Gap and gradient at x, for any scalar, through the shape's second-order jet.
+template <class T>
+struct LiftedGap {
+  T gap;
+  T gradient[3];
+  bool supported;
+  bool inside;  ///< unsupported only: behind the nearest sample, i.e. hopelessly deep
+};
+
+template <class T>
+LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* x_local) {
+  const Vec3 x0(value_of(x_local[0]), value_of(x_local[1]), value_of(x_local[2]));
+  const GapJet jet = shape.evaluate(x0);
+  LiftedGap<T> r;
+  r.supported = jet.supported;
+  r.inside = !jet.supported && jet.gap < 0;
+  const T dx[3] = {x_local[0] - x0[0], x_local[1] - x0[1], x_local[2] - x0[2]};
+  r.gap = T(jet.gap) + dx[0] * jet.gradient[0] + dx[1] * jet.gradient[1] + dx[2] * jet.gradient[2];
+  for (int i = 0; i < 3; ++i)
+    r.gradient[i] =
+        T(jet.gradient[i]) + dx[0] * jet.hessian(i, 0) + dx[1] * jet.hessian(i, 1) + dx[2] * jet.hessian(i, 2);
+  return r;
+}
+
+struct ContactLaw {
+  static constexpr int ne = 3, ns = 0, np = 0, ntheta = 5, nrest = 4;
+  static constexpr const char* name = "contact";
+  const ImplicitShape* shape = nullptr;
+  double onset = 1e-3;  ///< ε, mm; 0 = C¹ penalty as printed
+
+  /// κ φ(d) and its derivative by d, for depth d > 0.
+  template <class T>
+  static T penalty(const T& kappa, const T& depth, double onset, T& slope) {
+    if (value_of(depth) < onset) {
+      slope = kappa * depth * depth * (1.0 / onset);
+      return slope * depth * (1. / 3);
+    }
+    const T over = depth - onset;
+    slope = kappa * (2.0 * over + onset);
+    return kappa * (onset * onset / 3 + onset * over + over * over);
+  }
+
+  template <class T>
+  void prepare(const T*, const T*, const T*, const double*, double, T*) const {}
+
+  template <class T>
+  T stress(const T* u, const T*, const T* theta, const double* rest, double, T* traction) const {
+    const T x[3] = {u[0] + rest[0] - theta[2], u[1] + rest[1] - theta[3], u[2] + rest[2] - theta[4]};
+    for (int i = 0; i < 3; ++i) traction[i] = T(0.0);
+    const LiftedGap<T> g = lift_gap(*shape, x);
+    if (!g.supported) return T(g.inside ? std::numeric_limits<double>::infinity() : 0.0);
+    const T depth = theta[1] + rest[3] - g.gap;
+    if (!(value_of(depth) > 0)) return T(0.0);
+    T slope;
+    const T energy = penalty(theta[0], depth, onset, slope);
+    for (int i = 0; i < 3; ++i) traction[i] = -slope * g.gradient[i];
+    return energy;
+  }
+
+  template <class T>
+  void update(const T*, const T*, const T*, const double*, double, T*) const {}
+};
+
+enum class Mollifier { quintic, quadratic };
+
+struct FrictionLaw {
+  static constexpr int ne = 3, ns = 4, np = 7, ntheta = 9, nrest = 4;
+  static constexpr const char* name = "friction";
+  const ImplicitShape* shape = nullptr;
+  double onset = 1e-3;       ///< mm, as in the contact it belongs to
+  double slip_speed = 1;     ///< ε_v, mm/s
+  Mollifier mollifier = Mollifier::quintic;
+
+  /// D(δ; ε) and D'(δ)/δ from s = δ².
+  template <class T>
+  T mollify(const T& s, double eps, T& quotient) const {
+    if (value_of(s) < eps * eps) {
+      const T delta = sqrt_flat(s);
+      const double e = 1 / eps;
+      if (mollifier == Mollifier::quintic) {
+        quotient = (e * e * e) * (s * 10.0 + s * delta * (-15.0 * e) + s * s * (6.0 * e * e));
+        return (e * e * e) * s * s * (2.5 - 3.0 * e * delta + (e * e) * s);
+      }
+      quotient = 2.0 * e - (e * e) * delta;
+      return s * (e - delta * (e * e / 3));
+    }
+    const T delta = sqrt_flat(s);
+    quotient = 1.0 / delta;
+    return delta - (mollifier == Mollifier::quintic ? eps / 2 : eps / 3);
+  }
+
+  template <class T>
+  void prepare(const T* u_old, const T* lag, const T*, const double*, double, T* prepared) const {
+    for (int i = 0; i < 4; ++i) prepared[i] = lag[i];
+    for (int i = 0; i < 3; ++i) prepared[4 + i] = u_old[i];
+  }
+
+  template <class T>
+  T stress(const T* u, const T* prepared, const T* theta, const double*, double dt, T* traction) const {
+    const T &pressure = prepared[0], *n = prepared + 1, *u_old = prepared + 4;
+    for (int i = 0; i < 3; ++i) traction[i] = T(0.0);
+    if (!(value_of(pressure) > 0)) return T(0.0);
+    T slip[3];
+    for (int i = 0; i < 3; ++i) slip[i] = u[i] - u_old[i] - (theta[3 + i] - theta[6 + i]);
+    const T along = slip[0] * n[0] + slip[1] * n[1] + slip[2] * n[2];
+    for (int i = 0; i < 3; ++i) slip[i] -= along * n[i];
+    const T s = slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2];
+    T quotient;
+    const T strength = theta[2] * pressure;
+    const T energy = strength * mollify(s, slip_speed * dt, quotient);
+    const T f = strength * quotient;
+    // ∂s/∂u = 2 (I − n nᵀ) slip = 2 slip, since slip is already tangential and n is a unit vector
+    for (int i = 0; i < 3; ++i) traction[i] = f * slip[i];
+    return energy;
+  }
+
+  /// The lag of the next step: contact pressure −∂Ψ/∂g and unit normal at the converged position.
+  template <class T>
+  void update(const T* u, const T*, const T* theta, const double* rest, double, T* lag) const {
+    using std::sqrt;
+    const T x[3] = {u[0] + rest[0] - theta[3], u[1] + rest[1] - theta[4], u[2] + rest[2] - theta[5]};
+    for (int i = 0; i < 4; ++i) lag[i] = T(i == 3 ? 1.0 : 0.0);
+    const LiftedGap<T> g = lift_gap(*shape, x);
+    if (!g.supported) return;
+    const T depth = theta[1] + rest[3] - g.gap;
+    if (!(value_of(depth) > 0)) return;
+    T slope;
+    (void)ContactLaw::penalty(theta[0], depth, onset, slope);
+    const T length =
+        sqrt(g.gradient[0] * g.gradient[0] + g.gradient[1] * g.gradient[1] + g.gradient[2] * g.gradient[2]);
+    lag[0] = slope * length;
+    for (int i = 0; i < 3; ++i) lag[1 + i] = g.gradient[i] / length;
+  }
+};
+
+}  // inline namespace RHYTID_ISA
+}  // namespace rhytid

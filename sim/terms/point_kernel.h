@@ -1,0 +1,529 @@
+// From a law at a point to an element: the loops that every term shares, one element at a time.
+//
+//   energy       W = Σ_q w_q ψ(e_q)                       e = Y(∇u) on prisms, e = u on surfaces
+//   gradient     ∂W/∂u = Σ_q w_q Zᵀ (∂e/∂z)ᵀ σ            z = ∇u or u, linear in the nodal values: z = Z u
+//   Hessian      Zᵀ [ (∂e/∂z)ᵀ (∂σ/∂e) (∂e/∂z) + σ·∂²e/∂z² ] Z
+//   cross blocks derivatives of σ and of the history update by old state and parameters, with dual numbers
+//
+// A law supplies prepare, stress and update, templated on the scalar (skin_law.h is the richest example); everything
+// else, tangent and adjoint blocks included, is here and knows no physics. Eigen-free: the prism kernels are compiled
+// once per instruction set.
+//
+// Shapes   natural gradients table [q·R + r][npad], R = 3 on prisms, 1 on surfaces; element vectors [n][3].
+// Tests    tests/sim/terms/point_term_test.cpp
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "sim/math/jacobi.h"
+#include "sim/math/sym3.h"
+
+namespace rhytid {
+
+/// Directions that one tangent kernel call carries.
+inline constexpr int kDirections = 8;
+/// Rows of the table that one Hessian pass treats; a multiple of R.
+inline constexpr int kHessianRows = 24;
+
+/// Everything an element kernel reads, as plain pointers (see the shapes above; null where a law has none).
+struct ElementView {
+  int num_nodes, padded_nodes;   ///< n, npad (multiple of 8)
+  int num_points;                ///< nq
+  int padded_rows;               ///< length of a row of `rows_by_node`, ≥ nq·R, multiple of 8
+  const double* node_by_row;     ///< [nq·R][npad]
+  const double* rows_by_node;    ///< [n][padded_rows], the transpose
+  const double* inverse_jacobian;///< prisms: [nq][3][3] ∂ξ_r/∂X_I; surfaces: null
+  const double* weight;          ///< [nq] integration weight, mm³ or mm²
+  const double* rest;            ///< [nq][nrest]
+  const double* theta;           ///< [nq][ntheta], or one row when theta_stride = 0
+  int theta_stride;
+  double dt;                     ///< s
+};
+
+inline namespace RHYTID_ISA {
+
+/// Kinematics of a prism point: z = H = ∇u (row-major a, I), e = Y = H + Hᵀ + HᵀH.
+struct PrismKinematics {
+  static constexpr int rows = 3, nz = 9, ne = 6;
+
+  static void strain(const double* h, double* y) {
+    for (int c = 0; c < 6; ++c) {
+      const int k = kSymRow[c], l = kSymCol[c];
+      y[c] = h[3 * k + l] + h[3 * l + k] + h[k] * h[l] + h[3 + k] * h[3 + l] + h[6 + k] * h[6 + l];
+    }
+  }
+  /// det F − 1 from H.
+  static double det_minus_one_of(const double* h) {
+    const double tr = h[0] + h[4] + h[8];
+    const double minors =
+        h[0] * h[4] - h[1] * h[3] + h[0] * h[8] - h[2] * h[6] + h[4] * h[8] - h[5] * h[7];
+    const double det = h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) +
+                       h[2] * (h[3] * h[7] - h[4] * h[6]);
+    return tr + minors + det;
+  }
+  static bool feasible(const double* h) { return det_minus_one_of(h) > -1; }
+
+  /// ∂Y_c/∂H_aI = F_ak δ_lI + F_al δ_kI for c = (k, l).
+  static void strain_gradient(const double* h, double (*b)[9]) {
+    for (int c = 0; c < 6; ++c) {
+      const int k = kSymRow[c], l = kSymCol[c];
+      for (int z = 0; z < 9; ++z) b[c][z] = 0;
+      for (int a = 0; a < 3; ++a) {
+        b[c][3 * a + l] += h[3 * a + k] + (a == k);
+        b[c][3 * a + k] += h[3 * a + l] + (a == l);
+      }
+    }
+  }
+  /// Adds σ·∂²e/∂z²: δ_ab S_IJ.
+  static void add_geometric(const double* sigma, double (*a)[9]) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const double s = i == j ? 2 * sigma[i] : sigma[kSym[i][j]];
+        for (int c = 0; c < 3; ++c) a[3 * c + i][3 * c + j] += s;
+      }
+  }
+  /// z in natural directions (a, r) from nodal sums, and back: H_aI = Σ_r h_ar ∂ξ_r/∂X_I.
+  static void to_point(const double* natural, const double* ji, double* h) {
+    for (int a = 0; a < 3; ++a)
+      for (int i = 0; i < 3; ++i)
+        h[3 * a + i] = natural[3 * a] * ji[i] + natural[3 * a + 1] * ji[3 + i] + natural[3 * a + 2] * ji[6 + i];
+  }
+  static void from_point(const double* p, const double* ji, double weight, double* natural) {
+    for (int a = 0; a < 3; ++a)
+      for (int r = 0; r < 3; ++r)
+        natural[3 * a + r] =
+            weight * (p[3 * a] * ji[3 * r] + p[3 * a + 1] * ji[3 * r + 1] + p[3 * a + 2] * ji[3 * r + 2]);
+  }
+};
+
+/// Kinematics of a surface point: e = z = u.
+struct SurfaceKinematics {
+  static constexpr int rows = 1, nz = 3, ne = 3;
+  static void strain(const double* u, double* e) { std::memcpy(e, u, 3 * sizeof(double)); }
+  static bool feasible(const double*) { return true; }
+  static void strain_gradient(const double*, double (*b)[3]) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) b[i][j] = i == j;
+  }
+  static void add_geometric(const double*, double (*)[3]) {}
+  static void to_point(const double* natural, const double*, double* u) {
+    std::memcpy(u, natural, 3 * sizeof(double));
+  }
+  static void from_point(const double* p, const double*, double weight, double* natural) {
+    for (int a = 0; a < 3; ++a) natural[a] = weight * p[a];
+  }
+};
+
+/// C[i][j] += Σ_k A[k][i] B[k][j], all rows padded to `n8` (multiple of 8); only columns j ≥ from(i) are formed when
+/// `upper` (symmetric blocks).
+inline void multiply_add(const double* a, const double* b, int rows, int n8, bool upper, double* c) {
+  typedef double Lanes __attribute__((vector_size(32), aligned(8), may_alias));
+  for (int i = 0; i < n8; i += 4)
+    for (int j = upper ? (i & ~7) : 0; j < n8; j += 8) {
+      Lanes s[4][2];
+      for (int r = 0; r < 4; ++r) {
+        const Lanes* row = reinterpret_cast<const Lanes*>(c + static_cast<std::size_t>(i + r) * n8 + j);
+        s[r][0] = row[0];
+        s[r][1] = row[1];
+      }
+      for (int k = 0; k < rows; ++k) {
+        const Lanes* bk = reinterpret_cast<const Lanes*>(b + static_cast<std::size_t>(k) * n8 + j);
+        const Lanes b0 = bk[0], b1 = bk[1];
+        const double* ak = a + static_cast<std::size_t>(k) * n8 + i;
+        for (int r = 0; r < 4; ++r) {
+          const Lanes ar = {ak[r], ak[r], ak[r], ak[r]};
+          s[r][0] += ar * b0;
+          s[r][1] += ar * b1;
+        }
+      }
+      for (int r = 0; r < 4; ++r) {
+        Lanes* row = reinterpret_cast<Lanes*>(c + static_cast<std::size_t>(i + r) * n8 + j);
+        row[0] = s[r][0];
+        row[1] = s[r][1];
+      }
+    }
+}
+
+/// Element kernels of a law on a kinematics. All pointers are per element; see ElementView for shapes.
+template <class Law, class Kin>
+struct PointKernel {
+  static constexpr int ne = Law::ne, nz = Kin::nz, ns = Law::ns, np = Law::np, nt = Law::ntheta, R = Kin::rows;
+  static_assert(Law::ne == Kin::ne);
+  static constexpr int max_rows = 3 * 200;  ///< nq·R at most
+  static constexpr int at_least_one(int n) { return n > 0 ? n : 1; }
+
+  static const double* theta(const ElementView& v, int q) { return v.theta + static_cast<std::size_t>(q) * v.theta_stride; }
+  static const double* rest(const ElementView& v, int q) { return v.rest ? v.rest + q * Law::nrest : nullptr; }
+
+  /// natural[a][row] = Σ_i u[i][a] table[row][i].
+  static void gather(const ElementView& v, const double* u, double (*natural)[max_rows]) {
+    const int rows = v.num_points * R;
+    for (int a = 0; a < 3; ++a) std::memset(natural[a], 0, sizeof(double) * static_cast<std::size_t>(rows));
+    for (int i = 0; i < v.num_nodes; ++i) {
+      const double* t = v.rows_by_node + static_cast<std::size_t>(i) * v.padded_rows;
+      const double ux = u[3 * i], uy = u[3 * i + 1], uz = u[3 * i + 2];
+      for (int k = 0; k < rows; ++k) {
+        natural[0][k] += ux * t[k];
+        natural[1][k] += uy * t[k];
+        natural[2][k] += uz * t[k];
+      }
+    }
+  }
+  /// f[i][a] += Σ_row natural[a][row] table[row][i].
+  static void scatter(const ElementView& v, const double (*natural)[max_rows], double* f) {
+    const int rows = v.num_points * R;
+    for (int i = 0; i < v.num_nodes; ++i) {
+      const double* t = v.rows_by_node + static_cast<std::size_t>(i) * v.padded_rows;
+      double s[3] = {0, 0, 0};
+      for (int k = 0; k < rows; ++k) {
+        s[0] += natural[0][k] * t[k];
+        s[1] += natural[1][k] * t[k];
+        s[2] += natural[2][k] * t[k];
+      }
+      for (int a = 0; a < 3; ++a) f[3 * i + a] += s[a];
+    }
+  }
+  static void point(const ElementView& v, const double (*natural)[max_rows], int q, double* z) {
+    double local[nz];
+    for (int a = 0; a < 3; ++a)
+      for (int r = 0; r < R; ++r) local[a * R + r] = natural[a][q * R + r];
+    Kin::to_point(local, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, z);
+  }
+  static void put_point(const ElementView& v, const double* p, int q, double (*natural)[max_rows]) {
+    double local[nz];
+    Kin::from_point(p, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, v.weight[q], local);
+    for (int a = 0; a < 3; ++a)
+      for (int r = 0; r < R; ++r) natural[a][q * R + r] = local[a * R + r];
+  }
+
+  /// prepared[nq][np] from the old state.
+  static void prepare(const Law& law, const ElementView& v, const double* u_old, const double* s_old, double* prepared) {
+    if constexpr (np > 0) {
+      double natural[3][max_rows], z[nz], e[ne];
+      gather(v, u_old, natural);
+      for (int q = 0; q < v.num_points; ++q) {
+        point(v, natural, q, z);
+        Kin::strain(z, e);
+        law.template prepare<double>(e, s_old + q * ns, theta(v, q), rest(v, q), v.dt, prepared + q * np);
+      }
+    }
+  }
+
+  /// Energy; adds to f[n][3] unless null. +inf outside the domain (f is then meaningless).
+  static double energy(const Law& law, const ElementView& v, const double* u, const double* prepared, double* f) {
+    double natural[3][max_rows], out[3][max_rows], z[nz], e[ne], sigma[ne], total = 0;
+    gather(v, u, natural);
+    for (int q = 0; q < v.num_points; ++q) {
+      point(v, natural, q, z);
+      if (!Kin::feasible(z)) return std::numeric_limits<double>::infinity();
+      Kin::strain(z, e);
+      const double psi = law.template stress<double>(e, prepared + q * np, theta(v, q), rest(v, q), v.dt, sigma);
+      if (!std::isfinite(psi)) return std::numeric_limits<double>::infinity();
+      total += v.weight[q] * psi;
+      if (!f) continue;
+      double b[ne][nz], p[nz];
+      Kin::strain_gradient(z, b);
+      for (int i = 0; i < nz; ++i) {
+        p[i] = 0;
+        for (int c = 0; c < ne; ++c) p[i] += sigma[c] * b[c][i];
+      }
+      put_point(v, p, q, out);
+    }
+    if (f) scatter(v, out, f);
+    return total;
+  }
+
+  /// Dense Hessian [3n][3n], node-major, full. False when it is zero. `work` holds 6·npad² + 6·kHessianRows·npad +
+  /// kHessianRows·npad doubles.
+  static bool hessian(const Law& law, const ElementView& v, const double* u, const double* prepared, bool projected,
+                      double* work, double* dense) {
+    const int n8 = v.padded_nodes, n = v.num_nodes;
+    double* blocks = work;                                    // 6 blocks (a ≤ b) [npad][npad]
+    double* t = blocks + 6 * static_cast<std::size_t>(n8) * n8;  // 6 × [kHessianRows][npad]
+    double* g = t + 6 * static_cast<std::size_t>(kHessianRows) * n8;
+    double natural[3][max_rows], z[nz], e[ne];
+    gather(v, u, natural);
+    bool any = false;
+    int filled = 0;
+    const auto flush = [&] {
+      int block = 0;
+      for (int a = 0; a < 3; ++a)
+        for (int b = a; b < 3; ++b, ++block)
+          multiply_add(g, t + static_cast<std::size_t>(block) * kHessianRows * n8, filled, n8, a == b,
+                       blocks + static_cast<std::size_t>(block) * n8 * n8);
+      filled = 0;
+    };
+    for (int q = 0; q < v.num_points; ++q) {
+      point(v, natural, q, z);
+      Kin::strain(z, e);
+      Dual<ne> ed[ne], pd[at_least_one(np)], td[nt], sigma[ne];
+      for (int c = 0; c < ne; ++c) ed[c] = Dual<ne>::variable(e[c], c);
+      for (int c = 0; c < np; ++c) pd[c] = prepared[q * np + c];
+      for (int c = 0; c < nt; ++c) td[c] = theta(v, q)[c];
+      (void)law.template stress<Dual<ne>>(ed, pd, td, rest(v, q), v.dt, sigma);
+      double b[ne][nz], db[ne][nz], a[nz][nz], s[ne];
+      bool zero = true;
+      for (int c = 0; c < ne; ++c) {
+        s[c] = sigma[c].v;
+        zero = zero && s[c] == 0;
+        for (int k = 0; k < ne; ++k) zero = zero && sigma[c].d[k] == 0;
+      }
+      if (zero) continue;
+      if (!any) {
+        std::memset(blocks, 0, sizeof(double) * 6 * static_cast<std::size_t>(n8) * n8);
+        any = true;
+      }
+      Kin::strain_gradient(z, b);
+      for (int c = 0; c < ne; ++c)
+        for (int i = 0; i < nz; ++i) {
+          double sum = 0;
+          for (int k = 0; k < ne; ++k) sum += 0.5 * (sigma[c].d[k] + sigma[k].d[c]) * b[k][i];
+          db[c][i] = sum;
+        }
+      for (int i = 0; i < nz; ++i)
+        for (int j = 0; j < nz; ++j) {
+          double sum = 0;
+          for (int c = 0; c < ne; ++c) sum += b[c][i] * db[c][j];
+          a[i][j] = sum;
+        }
+      Kin::add_geometric(s, a);
+      if (projected) project_psd<nz>(a);
+      // Fold the Jacobian and the weight in: natural directions on both sides.
+      double half[nz][nz], folded[nz][nz];
+      const double* ji = R == 3 ? v.inverse_jacobian + 9 * q : nullptr;
+      for (int i = 0; i < nz; ++i) Kin::from_point(a[i], ji, v.weight[q], half[i]);
+      for (int j = 0; j < nz; ++j) {
+        double column[nz], mapped[nz];
+        for (int i = 0; i < nz; ++i) column[i] = half[i][j];
+        Kin::from_point(column, ji, 1, mapped);
+        for (int i = 0; i < nz; ++i) folded[i][j] = mapped[i];
+      }
+      const double* table = v.node_by_row + static_cast<std::size_t>(q) * R * n8;
+      std::memcpy(g + static_cast<std::size_t>(filled) * n8, table, sizeof(double) * R * static_cast<std::size_t>(n8));
+      int block = 0;
+      for (int ca = 0; ca < 3; ++ca)
+        for (int cb = ca; cb < 3; ++cb, ++block)
+          for (int r = 0; r < R; ++r) {
+            double* row = t + (static_cast<std::size_t>(block) * kHessianRows + filled + r) * n8;
+            for (int j = 0; j < n8; ++j) {
+              double sum = 0;
+              for (int sn = 0; sn < R; ++sn) sum += folded[ca * R + r][cb * R + sn] * table[sn * n8 + j];
+              row[j] = sum;
+            }
+          }
+      filled += R;
+      if (filled == kHessianRows) flush();
+    }
+    if (!any) return false;
+    if (filled) flush();
+    const int n3 = 3 * n;
+    int block = 0;
+    for (int a = 0; a < 3; ++a)
+      for (int b = a; b < 3; ++b, ++block) {
+        const double* k = blocks + static_cast<std::size_t>(block) * n8 * n8;
+        for (int i = 0; i < n; ++i)
+          for (int j = a == b ? i : 0; j < n; ++j) {
+            const double value = k[static_cast<std::size_t>(i) * n8 + j];
+            dense[static_cast<std::size_t>(3 * i + a) * n3 + 3 * j + b] = value;
+            dense[static_cast<std::size_t>(3 * j + b) * n3 + 3 * i + a] = value;
+          }
+      }
+    return true;
+  }
+
+  /// New history [nq][ns].
+  static void update(const Law& law, const ElementView& v, const double* u, const double* prepared, double* s_new) {
+    if constexpr (ns > 0) {
+      double natural[3][max_rows], z[nz], e[ne];
+      gather(v, u, natural);
+      for (int q = 0; q < v.num_points; ++q) {
+        point(v, natural, q, z);
+        Kin::strain(z, e);
+        law.template update<double>(e, prepared + q * np, theta(v, q), rest(v, q), v.dt, s_new + q * ns);
+      }
+    }
+  }
+
+  using Directions = Dual<kDirections>;
+
+  /// A strain as a dual along kDirections nodal directions du [n][3][kDirections] (null = zero derivative).
+  static void seed_strain(const ElementView& v, const double (*natural)[max_rows], const double* du, int q,
+                          Directions* e) {
+    double z[nz], value[ne];
+    point(v, natural, q, z);
+    Kin::strain(z, value);
+    for (int c = 0; c < ne; ++c) e[c] = Directions(value[c]);
+    if (!du) return;
+    double local[nz][kDirections] = {};
+    for (int i = 0; i < v.num_nodes; ++i)
+      for (int r = 0; r < R; ++r) {
+        const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
+        for (int a = 0; a < 3; ++a)
+          for (int k = 0; k < kDirections; ++k) local[a * R + r][k] += t * du[(3 * i + a) * kDirections + k];
+      }
+    double b[ne][nz];
+    Kin::strain_gradient(z, b);
+    for (int k = 0; k < kDirections; ++k) {
+      double column[nz], dz[nz];
+      for (int i = 0; i < nz; ++i) column[i] = local[i][k];
+      Kin::to_point(column, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, dz);
+      for (int c = 0; c < ne; ++c)
+        for (int i = 0; i < nz; ++i) e[c].d[k] += b[c][i] * dz[i];
+    }
+  }
+
+  /// Directional derivatives along (du, du_old [n][3][8], ds_old [nq][ns][8], dtheta [nq][nt][8]); any may be null.
+  /// Adds the residual's derivative at fixed u to df [n][3][8] when df is given; writes the history update's derivative
+  /// ds_new [nq][ns][8] (with du) when ds_new is given.
+  static void tangent(const Law& law, const ElementView& v, const double* u, const double* u_old, const double* s_old,
+                      const double* du, const double* du_old, const double* ds_old, const double* dtheta, double* df,
+                      double* ds_new) {
+    double natural[3][max_rows], natural_old[3][max_rows];
+    gather(v, u, natural);
+    gather(v, u_old, natural_old);
+    for (int q = 0; q < v.num_points; ++q) {
+      Directions e[ne], e_old[ne], s[at_least_one(ns)], th[nt], prepared[at_least_one(np)];
+      seed_strain(v, natural_old, du_old, q, e_old);
+      for (int c = 0; c < ns; ++c) {
+        s[c] = s_old[q * ns + c];
+        if (ds_old) std::memcpy(s[c].d, ds_old + (q * ns + c) * kDirections, sizeof s[c].d);
+      }
+      for (int c = 0; c < nt; ++c) {
+        th[c] = theta(v, q)[c];
+        if (dtheta) std::memcpy(th[c].d, dtheta + (q * nt + c) * kDirections, sizeof th[c].d);
+      }
+      law.template prepare<Directions>(e_old, s, th, rest(v, q), v.dt, prepared);
+      if (df) {
+        Directions sigma[ne];
+        double z[nz], b[ne][nz];
+        seed_strain(v, natural, nullptr, q, e);
+        (void)law.template stress<Directions>(e, prepared, th, rest(v, q), v.dt, sigma);
+        point(v, natural, q, z);
+        Kin::strain_gradient(z, b);
+        for (int k = 0; k < kDirections; ++k) {
+          double p[nz], local[nz];
+          for (int i = 0; i < nz; ++i) {
+            p[i] = 0;
+            for (int c = 0; c < ne; ++c) p[i] += sigma[c].d[k] * b[c][i];
+          }
+          Kin::from_point(p, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, v.weight[q], local);
+          for (int i = 0; i < v.num_nodes; ++i)
+            for (int r = 0; r < R; ++r) {
+              const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
+              for (int a = 0; a < 3; ++a) df[(3 * i + a) * kDirections + k] += t * local[a * R + r];
+            }
+        }
+      }
+      if constexpr (ns > 0) {
+        if (ds_new) {
+          Directions s_new[ns];
+          seed_strain(v, natural, du, q, e);
+          law.template update<Directions>(e, prepared, th, rest(v, q), v.dt, s_new);
+          for (int c = 0; c < ns; ++c) std::memcpy(ds_new + (q * ns + c) * kDirections, s_new[c].d, sizeof s_new[c].d);
+        }
+      }
+    }
+  }
+
+  /// Adds (∂s_new/∂u)ᵀ s_bar to u_bar [n][3].
+  static void adjoint_update(const Law& law, const ElementView& v, const double* u, const double* prepared,
+                             const double* s_bar, double* u_bar) {
+    if constexpr (ns > 0) {
+      double natural[3][max_rows], out[3][max_rows];
+      gather(v, u, natural);
+      for (int q = 0; q < v.num_points; ++q) {
+        double z[nz], e[ne], b[ne][nz], p[nz];
+        point(v, natural, q, z);
+        Kin::strain(z, e);
+        Dual<ne> ed[ne], pd[at_least_one(np)], td[nt], s_new[ns];
+        for (int c = 0; c < ne; ++c) ed[c] = Dual<ne>::variable(e[c], c);
+        for (int c = 0; c < np; ++c) pd[c] = prepared[q * np + c];
+        for (int c = 0; c < nt; ++c) td[c] = theta(v, q)[c];
+        law.template update<Dual<ne>>(ed, pd, td, rest(v, q), v.dt, s_new);
+        Kin::strain_gradient(z, b);
+        for (int i = 0; i < nz; ++i) p[i] = 0;
+        for (int c = 0; c < ne; ++c) {
+          double bar = 0;
+          for (int k = 0; k < ns; ++k) bar += s_bar[q * ns + k] * s_new[k].d[c];
+          for (int i = 0; i < nz; ++i) p[i] += bar * b[c][i];
+        }
+        for (int i = 0; i < nz; ++i) p[i] /= v.weight[q];  // put_point multiplies by the weight; this sum has none
+        put_point(v, p, q, out);
+      }
+      scatter(v, out, u_bar);
+    }
+  }
+
+  /// Transposed cross blocks of φ = −λ·R + s_bar·s_new at fixed u: adds ∂φ/∂u_old to u_old_bar [n][3], writes
+  /// ∂φ/∂s_old to s_old_bar [nq][ns] and ∂φ/∂θ to theta_bar [nq][nt].
+  static void adjoint_step(const Law& law, const ElementView& v, const double* u, const double* u_old,
+                           const double* s_old, const double* prepared, const double* adj, const double* s_bar,
+                           double* u_old_bar, double* s_old_bar, double* theta_bar) {
+    constexpr int nd = np + nt, no = ne + ns + nt;
+    double natural[3][max_rows], natural_old[3][max_rows], natural_adj[3][max_rows], out[3][max_rows];
+    gather(v, u, natural);
+    gather(v, adj, natural_adj);
+    if constexpr (np > 0) gather(v, u_old, natural_old);
+    for (int q = 0; q < v.num_points; ++q) {
+      double z[nz], e[ne], b[ne][nz], dz[nz], de[ne];
+      point(v, natural, q, z);
+      Kin::strain(z, e);
+      Kin::strain_gradient(z, b);
+      point(v, natural_adj, q, dz);
+      for (int c = 0; c < ne; ++c) {
+        de[c] = 0;
+        for (int i = 0; i < nz; ++i) de[c] += b[c][i] * dz[i];
+      }
+      double prepared_bar[at_least_one(np)] = {};
+      {
+        Dual<nd> ed[ne], pd[at_least_one(np)], td[nt], sigma[ne];
+        for (int c = 0; c < ne; ++c) ed[c] = e[c];
+        for (int c = 0; c < np; ++c) pd[c] = Dual<nd>::variable(prepared[q * np + c], c);
+        for (int c = 0; c < nt; ++c) td[c] = Dual<nd>::variable(theta(v, q)[c], np + c);
+        (void)law.template stress<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, sigma);
+        double bar[nd];
+        for (int k = 0; k < nd; ++k) {
+          bar[k] = 0;
+          for (int c = 0; c < ne; ++c) bar[k] -= v.weight[q] * de[c] * sigma[c].d[k];
+        }
+        if constexpr (ns > 0) {
+          Dual<nd> s_new[ns];
+          law.template update<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, s_new);
+          for (int k = 0; k < nd; ++k)
+            for (int c = 0; c < ns; ++c) bar[k] += s_bar[q * ns + c] * s_new[c].d[k];
+        }
+        for (int c = 0; c < np; ++c) prepared_bar[c] = bar[c];
+        for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] = bar[np + c];
+      }
+      if constexpr (np > 0) {
+        double z_old[nz], e_old[ne], b_old[ne][nz], p[nz], bar[no];
+        point(v, natural_old, q, z_old);
+        Kin::strain(z_old, e_old);
+        Kin::strain_gradient(z_old, b_old);
+        Dual<no> eo[ne], so[at_least_one(ns)], td[nt], pd[np];
+        for (int c = 0; c < ne; ++c) eo[c] = Dual<no>::variable(e_old[c], c);
+        for (int c = 0; c < ns; ++c) so[c] = Dual<no>::variable(s_old[q * ns + c], ne + c);
+        for (int c = 0; c < nt; ++c) td[c] = Dual<no>::variable(theta(v, q)[c], ne + ns + c);
+        law.template prepare<Dual<no>>(eo, so, td, rest(v, q), v.dt, pd);
+        for (int k = 0; k < no; ++k) {
+          bar[k] = 0;
+          for (int c = 0; c < np; ++c) bar[k] += prepared_bar[c] * pd[c].d[k];
+        }
+        for (int i = 0; i < nz; ++i) {
+          p[i] = 0;
+          for (int c = 0; c < ne; ++c) p[i] += bar[c] * b_old[c][i];
+          p[i] /= v.weight[q];
+        }
+        put_point(v, p, q, out);
+        for (int c = 0; c < ns; ++c) s_old_bar[q * ns + c] = bar[ne + c];
+        for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] += bar[ne + ns + c];
+      }
+    }
+    if constexpr (np > 0) scatter(v, out, u_old_bar);
+  }
+};
+
+}  // inline namespace RHYTID_ISA
+}  // namespace rhytid

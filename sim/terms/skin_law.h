@@ -1,0 +1,166 @@
+// Skin at a material point: Hencky-Fung equilibrium spring, Maxwell branch, volumetric penalty.
+//
+//   ψ = μ∞/C (exp(C q) − 1) + w μ_m q_e + K/2 (J − 1)²,    q = tr Ē²,  q_e = tr Ē_e²
+//   Ē = dev ½ ln C,   Ē_e = dev ½ ln X,   X = L⁻¹ C L⁻ᵀ,   Ĉ^v = L Lᵀ the pre-relaxed viscous history
+//   S = 2 ∂ψ/∂C = [ 2 μ∞ e^(Cq) Ē + 2 w μ_m L⁻ᵀ Ē_e Lᵀ + K (J−1) J I ] C⁻¹
+//
+// Only eigenvalues of C and of C (C^v)⁻¹ enter, so C^v = F^vᵀ F^v (6 numbers, det 1) is the whole history; it is
+// kept as C^v − I, and strain as Y = C − I, so that the rest state is exact.
+//
+// Source   paper.tex "Material Modeling", "Viscous Time Integration"; deviation: C^v instead of F^v (identical to
+//          round-off), damper schemes other than `literal` (DESIGN section 2).
+// Units    μ∞, μ_m, K [MPa], C [1], τ [s], dt [s]; ψ [MPa = mJ/mm³].
+// Shapes   e = Y [6] (xx yy zz xy xz yz), σ = ∂ψ/∂Y [6] (off-diagonal entries count both halves), history C^v − I [6].
+// Smooth   analytic for J > 0; the caller rejects J ≤ 0.
+// Tests    tests/sim/terms/skin_law_test.cpp
+#pragma once
+
+#include "sim/math/sym3.h"
+#include "sim/terms/damper.h"
+
+namespace rhytid {
+inline namespace RHYTID_ISA {
+
+struct SkinTheta {
+  static constexpr int mu_inf = 0, stiffening = 1, bulk = 2, mu_m = 3, tau = 4;
+};
+
+/// C̄ − I from Y = C − I, C̄ = J^(−2/3) C.
+template <class T>
+void isochoric(const T* y, T* ybar) {
+  using std::expm1;
+  using std::log1p;
+  const T scale = expm1(log1p(det_minus_one(y)) * (-1. / 3));  // (det C)^(−1/3) − 1
+  for (int c = 0; c < 6; ++c) ybar[c] = y[c] + y[c] * scale;
+  for (int c = 0; c < 3; ++c) ybar[c] += scale;
+}
+
+/// Deviator of ½ log(I + Y) into e, and q = tr e².
+template <class T>
+T half_log_deviator(const T* y, T* e) {
+  log_one_plus(y, e);
+  const T mean = (e[0] + e[1] + e[2]) * (1. / 3);
+  for (int c = 0; c < 3; ++c) e[c] = (e[c] - mean) * 0.5;
+  for (int c = 3; c < 6; ++c) e[c] = e[c] * 0.5;
+  return e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + 2.0 * (e[3] * e[3] + e[4] * e[4] + e[5] * e[5]);
+}
+
+/// The equilibrium part: energy and N with S = N C⁻¹, N symmetric and coaxial with C.
+template <class T>
+T equilibrium(const T* y, const T* theta, T* n) {
+  using std::exp;
+  using std::expm1;
+  using std::log1p;
+  const T q = half_log_deviator(y, n);
+  const T& mu = theta[SkinTheta::mu_inf];
+  const T& stiffening = theta[SkinTheta::stiffening];
+  const T& bulk = theta[SkinTheta::bulk];
+  const T z = stiffening * q;
+  const T factor = 2.0 * mu * exp(z);
+  const T jm1 = expm1(0.5 * log1p(det_minus_one(y)));  // J − 1
+  const T pressure = bulk * jm1 * (jm1 + 1.0);
+  for (int c = 0; c < 6; ++c) n[c] = factor * n[c];
+  for (int c = 0; c < 3; ++c) n[c] += pressure;
+  // (e^z − 1)/C → q as C → 0
+  const T fung = value_of(stiffening) > 1e-12 ? expm1(z) / stiffening : q * (1.0 + 0.5 * z);
+  return mu * fung + 0.5 * bulk * jm1 * jm1;
+}
+
+/// sigma = ∂ψ/∂Y from S = sym(A C⁻¹), A a general matrix [3][3] that makes A C⁻¹ symmetric.
+template <class T>
+void stress_from(const T (*a)[3], const T* y, T* sigma) {
+  T inverse[6];
+  inverse_one_plus(y, inverse);
+  for (int c = 0; c < 6; ++c) {
+    const int i = kSymRow[c], j = kSymCol[c];
+    T sij = a[i][0] * inverse[kSym[0][j]] + a[i][1] * inverse[kSym[1][j]] + a[i][2] * inverse[kSym[2][j]];
+    if (c < 3) {
+      sigma[c] = 0.5 * sij;
+    } else {
+      const T sji = a[j][0] * inverse[kSym[0][i]] + a[j][1] * inverse[kSym[1][i]] + a[j][2] * inverse[kSym[2][i]];
+      sigma[c] = 0.5 * (sij + sji);  // both halves of ½ S
+    }
+  }
+}
+
+/// Viscoelastic skin. Prepared data: Ĉ^v − I, the history relaxed toward the old configuration.
+struct SkinLaw {
+  static constexpr int ne = 6, ns = 6, np = 6, ntheta = 5, nrest = 0;
+  static constexpr const char* name = "skin";
+  DamperScheme scheme = DamperScheme::exponential;
+
+  template <class T>
+  void prepare(const T* y_old, const T* history, const T* theta, const double*, double dt, T* prepared) const {
+    const Damper<T> d = damper(scheme, theta[SkinTheta::tau], dt);
+    if (scheme == DamperScheme::exponential || scheme == DamperScheme::strang) {
+      T ybar[6];
+      isochoric(y_old, ybar);
+      geometric_mean(history, ybar, d.pre, prepared);
+    } else {
+      for (int c = 0; c < 6; ++c) prepared[c] = history[c];
+    }
+  }
+
+  /// Energy density; writes σ = ∂ψ/∂Y.
+  template <class T>
+  T stress(const T* y, const T* prepared, const T* theta, const double*, double dt, T* sigma) const {
+    T n[6], l[6], m[6], difference[6], x[6], ee[6];
+    T psi = equilibrium(y, theta, n);
+    cholesky_one_plus(prepared, l);
+    invert_lower(l, m);
+    for (int c = 0; c < 6; ++c) difference[c] = y[c] - prepared[c];
+    congruence_lower(m, difference, x);  // X − I
+    const T qe = half_log_deviator(x, ee);
+    const T k = damper(scheme, theta[SkinTheta::tau], dt).weight * theta[SkinTheta::mu_m];
+    psi += k * qe;
+    // A = N + 2 k L⁻ᵀ Ē_e Lᵀ
+    const T lower[3][3] = {{l[0], T(0.0), T(0.0)}, {l[3], l[1], T(0.0)}, {l[4], l[5], l[2]}};
+    const T inverse[3][3] = {{m[0], T(0.0), T(0.0)}, {m[3], m[1], T(0.0)}, {m[4], m[5], m[2]}};
+    T el[3][3], a[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        T sum = ee[kSym[i][0]] * lower[j][0];
+        for (int r = 1; r <= j; ++r) sum += ee[kSym[i][r]] * lower[j][r];
+        el[i][j] = sum;
+      }
+    const T twice = 2.0 * k;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        T sum = inverse[i][i] * el[i][j];
+        for (int r = i + 1; r < 3; ++r) sum += inverse[r][i] * el[r][j];
+        a[i][j] = n[kSym[i][j]] + twice * sum;
+      }
+    stress_from(a, y, sigma);
+    return psi;
+  }
+
+  template <class T>
+  void update(const T* y, const T* prepared, const T* theta, const double*, double dt, T* history) const {
+    T ybar[6];
+    isochoric(y, ybar);
+    geometric_mean(prepared, ybar, damper(scheme, theta[SkinTheta::tau], dt).post, history);
+  }
+};
+
+/// Skin without a Maxwell branch: no history, half the work. θ = μ∞, C, K.
+struct ElasticSkinLaw {
+  static constexpr int ne = 6, ns = 0, np = 0, ntheta = 3, nrest = 0;
+  static constexpr const char* name = "skin";
+
+  template <class T>
+  void prepare(const T*, const T*, const T*, const double*, double, T*) const {}
+  template <class T>
+  T stress(const T* y, const T*, const T* theta, const double*, double, T* sigma) const {
+    T n[6], a[3][3];
+    const T psi = equilibrium(y, theta, n);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) a[i][j] = n[kSym[i][j]];
+    stress_from(a, y, sigma);
+    return psi;
+  }
+  template <class T>
+  void update(const T*, const T*, const T*, const double*, double, T*) const {}
+};
+
+}  // inline namespace RHYTID_ISA
+}  // namespace rhytid

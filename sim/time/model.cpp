@@ -1,0 +1,165 @@
+#include "sim/time/model.h"
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "sim/core/error.h"
+
+namespace rhytid {
+
+void Model::finish() {
+  history_offsets_.clear();
+  history_size_ = 0;
+  std::map<std::vector<int>, int> known;
+  std::vector<std::vector<int>> cliques;
+  for (Term& term : terms) {
+    history_offsets_.push_back(history_size_);
+    history_size_ += term.history_size();
+    for (TermGroup& g : term.groups()) {
+      g.cliques.resize(g.num_elements);
+      for (int e = 0; e < g.num_elements; ++e) {
+        std::vector<int> blocks(g.num_nodes);
+        for (int i = 0; i < g.num_nodes; ++i)
+          blocks[i] = constraints.block[g.nodes[static_cast<std::size_t>(e) * g.num_nodes + i]];
+        const auto [it, fresh] = known.try_emplace(blocks, static_cast<int>(cliques.size()));
+        if (fresh) cliques.push_back(blocks);
+        g.cliques[e] = it->second;
+      }
+    }
+  }
+  // Faces whose nodes are all fixed give all −1 cliques; several of them share one key, which is harmless.
+  pattern_ = std::make_shared<BlockPattern>(static_cast<int>(constraints.block_nodes.size()), std::move(cliques));
+}
+
+State Model::rest_state() const {
+  return {0, VectorXd::Zero(3 * num_nodes()), VectorXd::Zero(static_cast<Eigen::Index>(history_size_))};
+}
+
+const NativeBlock& Model::native_block(const std::string& name) const {
+  for (const NativeBlock& block : native_blocks)
+    if (block.name == name) return block;
+  throw ContractError("no native parameter block '" + name + "'");
+}
+
+MatrixXd Model::to_unknowns(const MatrixXd& u) const {
+  const auto& c = constraints;
+  MatrixXd q(3 * c.block_nodes.size(), u.cols());
+  for (std::size_t b = 0; b < c.block_nodes.size(); ++b) {
+    const auto rows = u.middleRows(3 * c.block_nodes[b], 3);
+    if (c.frame_of_block[b] < 0) {
+      q.middleRows(3 * b, 3) = rows;
+    } else {
+      q.middleRows(3 * b, 3) = c.frames[c.frame_of_block[b]].transpose() * rows;
+    }
+  }
+  for (int i : c.fixed_unknowns) q.row(i).setZero();
+  return q;
+}
+
+MatrixXd Model::to_displacement(const MatrixXd& q) const {
+  const auto& c = constraints;
+  MatrixXd u = MatrixXd::Zero(3 * num_nodes(), q.cols());
+  for (std::size_t b = 0; b < c.block_nodes.size(); ++b) {
+    const auto rows = q.middleRows(3 * b, 3);
+    if (c.frame_of_block[b] < 0) {
+      u.middleRows(3 * c.block_nodes[b], 3) = rows;
+    } else {
+      u.middleRows(3 * c.block_nodes[b], 3) = c.frames[c.frame_of_block[b]] * rows;
+    }
+  }
+  return u;
+}
+
+VectorXd Model::to_unknowns(const VectorXd& u) const { return to_unknowns(MatrixXd(u)).col(0); }
+VectorXd Model::to_displacement(const VectorXd& q) const { return to_displacement(MatrixXd(q)).col(0); }
+
+StepProblem::StepProblem(const Model& model, const VectorXd& native, const StepInfo& step, const State& old)
+    : model_(&model), native_(&native), step_(step), old_(&old), data_(model.terms.size()) {
+  require(step.dt() > 0, "StepProblem: the step's dt must be positive");
+  for (std::size_t k = 0; k < model.terms.size(); ++k)
+    model.terms[k].prepare(step_, native, old.u, old.history.data() + model.history_offset(k), data_[k]);
+}
+
+double StepProblem::energy(const VectorXd& q, VectorXd* gradient) {
+  const VectorXd u = model_->to_displacement(q);
+  VectorXd g, absolute;
+  if (gradient) g = absolute = VectorXd::Zero(u.size());
+  double total = 0;
+  for (std::size_t k = 0; k < data_.size(); ++k) {
+    total += model_->terms[k].energy(step_, data_[k], u, gradient ? &g : nullptr, gradient ? &absolute : nullptr);
+    if (!std::isfinite(total)) return std::numeric_limits<double>::infinity();
+  }
+  if (gradient) {
+    *gradient = model_->to_unknowns(g);
+    force_scale_ = absolute.norm();
+  }
+  return total;
+}
+
+VectorXd StepProblem::residual(const VectorXd& u) const {
+  VectorXd g = VectorXd::Zero(u.size());
+  for (std::size_t k = 0; k < data_.size(); ++k) (void)model_->terms[k].energy(step_, data_[k], u, &g, nullptr);
+  return g;
+}
+
+std::vector<double> StepProblem::term_energies(const VectorXd& u) const {
+  std::vector<double> energies;
+  for (std::size_t k = 0; k < data_.size(); ++k)
+    energies.push_back(model_->terms[k].energy(step_, data_[k], u, nullptr, nullptr));
+  return energies;
+}
+
+namespace {
+
+/// Rotates framed nodes' rows and columns, then adds to the block matrix.
+class FramedSink final : public Term::MatrixSink {
+ public:
+  FramedSink(const Constraints& constraints, BlockMatrix& out) : constraints_(constraints), out_(out) {}
+  void add(const TermGroup& g, int element, double* dense) override {
+    if (!constraints_.frames.empty()) rotate(g, element, dense);
+    out_.add(g.cliques[element], dense);
+  }
+
+ private:
+  void rotate(const TermGroup& g, int element, double* dense) {
+    const int n3 = 3 * g.num_nodes;
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> k(dense, n3, n3);
+    for (int i = 0; i < g.num_nodes; ++i) {
+      const int block = constraints_.block[g.nodes[static_cast<std::size_t>(element) * g.num_nodes + i]];
+      if (block < 0 || constraints_.frame_of_block[block] < 0) continue;
+      const Mat3& frame = constraints_.frames[constraints_.frame_of_block[block]];
+      k.middleRows(3 * i, 3) = (frame.transpose() * k.middleRows(3 * i, 3)).eval();
+      k.middleCols(3 * i, 3) = (k.middleCols(3 * i, 3) * frame).eval();
+    }
+  }
+  const Constraints& constraints_;
+  BlockMatrix& out_;
+};
+
+}  // namespace
+
+void StepProblem::hessian(const VectorXd& q, Curvature curvature, BlockMatrix& out) {
+  const VectorXd u = model_->to_displacement(q);
+  out.set_zero();
+  FramedSink sink(model_->constraints, out);
+  for (std::size_t k = 0; k < data_.size(); ++k)
+    model_->terms[k].hessian(step_, data_[k], u, curvature == Curvature::projected, sink);
+  for (int i : model_->constraints.fixed_unknowns) out.fix(i);
+}
+
+double StepProblem::largest_feasible_step(const VectorXd& q, const VectorXd& d) {
+  const VectorXd u = model_->to_displacement(q), du = model_->to_displacement(d);
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const Term& term : model_->terms) smallest = std::min(smallest, term.feasible_step(u, du));
+  return smallest;
+}
+
+State StepProblem::advance(const VectorXd& u) const {
+  State next{step_.t, u, VectorXd::Zero(static_cast<Eigen::Index>(model_->history_size()))};
+  for (std::size_t k = 0; k < data_.size(); ++k)
+    model_->terms[k].update(step_, data_[k], u, next.history.data() + model_->history_offset(k));
+  return next;
+}
+
+}  // namespace rhytid

@@ -1,0 +1,102 @@
+// A scene made ready to run: prism mesh, the energy terms the scene needs (and no others), native parameters,
+// constraints and sparsity.
+//
+// Residual convention: R = +∂W/∂u; the internal force is −R. Unknowns q: per free node its three components in the
+// node's own frame (identity but for sliding rims), so that every constraint fixes single components.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sim/mesh/skin_mesh.h"
+#include "sim/solve/objective.h"
+#include "sim/surface/implicit_shape.h"
+#include "sim/terms/term.h"
+#include "sim/time/state.h"
+
+namespace rhytid {
+
+/// A named run of native parameters.
+struct NativeBlock {
+  std::string name;     ///< e.g. "layer/film", "ligaments/b", "collider/finger/path"
+  int offset = 0, size = 0;
+  /// Entries that scale all energies when multiplied together (moduli, k, κ): the gauge direction.
+  std::vector<int> stiffness_like;  ///< indices into the native vector
+};
+
+/// Per node: which of its components are unknowns.
+struct Constraints {
+  std::vector<int> block;           ///< [num_nodes] block index, −1 = fully fixed at zero displacement
+  std::vector<int> block_nodes;     ///< [num_blocks] node
+  std::vector<Mat3> frames;         ///< per framed block: columns are the frame's axes
+  std::vector<int> frame_of_block;  ///< [num_blocks] index into frames, −1 = identity
+  std::vector<int> fixed_unknowns;  ///< unknowns q that stay zero
+};
+
+class Model {
+ public:
+  SkinMesh mesh;
+  std::vector<Term> terms;
+  std::vector<std::shared_ptr<const ImplicitShape>> shapes;  ///< owned here, referenced by contact laws
+  VectorXd native;                                           ///< current native parameter values
+  std::vector<NativeBlock> native_blocks;
+  Constraints constraints;
+
+  /// Assigns history slices and builds the sparsity. Call once, after terms and constraints are set.
+  void finish();
+
+  int num_nodes() const { return mesh.num_nodes(); }
+  const BlockPattern& pattern() const { return *pattern_; }
+  std::size_t history_size() const { return history_size_; }
+  std::size_t history_offset(std::size_t term) const { return history_offsets_[term]; }
+  /// The rest state: zero displacement, C^v = I, no lagged pressure.
+  State rest_state() const;
+  const NativeBlock& native_block(const std::string& name) const;  ///< throws ContractError when absent
+
+  /// Unknowns from displacements and back (a gradient maps like a displacement; fixed components read as zero).
+  VectorXd to_unknowns(const VectorXd& u) const;
+  VectorXd to_displacement(const VectorXd& q) const;
+  /// Same for k columns at once, [num_nodes·3][k] → [num_unknowns][k].
+  MatrixXd to_unknowns(const MatrixXd& u) const;
+  MatrixXd to_displacement(const MatrixXd& q) const;
+
+ private:
+  std::shared_ptr<const BlockPattern> pattern_;
+  std::size_t history_size_ = 0;
+  std::vector<std::size_t> history_offsets_;
+};
+
+/// One step's problem: energies of all terms with the old state prepared. The model, native vector and old state must
+/// outlive it.
+class StepProblem final : public Objective {
+ public:
+  StepProblem(const Model& model, const VectorXd& native, const StepInfo& step, const State& old);
+  const BlockPattern& pattern() const override { return model_->pattern(); }
+  double energy(const VectorXd& q, VectorXd* gradient) override;
+  double force_scale() const override { return force_scale_; }
+  void hessian(const VectorXd& q, Curvature curvature, BlockMatrix& out) override;
+  double largest_feasible_step(const VectorXd& q, const VectorXd& d) override;
+
+  const Model& model() const { return *model_; }
+  const VectorXd& native() const { return *native_; }
+  const StepInfo& step() const { return step_; }
+  const State& old() const { return *old_; }
+  const TermStepData& data(std::size_t term) const { return data_[term]; }
+  /// Residual in displacement components [num_nodes·3], fixed components included (reactions).
+  VectorXd residual(const VectorXd& u) const;
+  /// Energy of each term at u, mJ.
+  std::vector<double> term_energies(const VectorXd& u) const;
+  /// The state after the step, given its converged displacement.
+  State advance(const VectorXd& u) const;
+
+ private:
+  const Model* model_;
+  const VectorXd* native_;
+  StepInfo step_;
+  const State* old_;
+  std::vector<TermStepData> data_;
+  double force_scale_ = 0;
+};
+
+}  // namespace rhytid

@@ -1,0 +1,16 @@
+// Everything that crosses a step. What is not in here, the adjoint cannot see.
+#pragma once
+
+#include "sim/core/types.h"
+
+namespace rhytid {
+
+/// State after a converged step: displacement and per-point histories (C^v − I of skin, lagged pressure and normal of
+/// friction), the slices of the terms one after the other in the model's order.
+struct State {
+  double time = 0;   ///< s
+  VectorXd u;        ///< [num_nodes·3] displacement, mm
+  VectorXd history;  ///< [history_size]
+};
+
+}  // namespace rhytid
