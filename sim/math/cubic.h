@@ -10,7 +10,8 @@ namespace rhytid {
 /// Coefficients c of det(F + s D) = c0 + c1 s + c2 s² + c3 s³; F, D row-major 3×3.
 inline void determinant_along(const double* f, const double* d, double* c) {
   const auto det = [](const double* a, const double* b, const double* e) {  // rows a, b, e
-    return a[0] * (b[1] * e[2] - b[2] * e[1]) - a[1] * (b[0] * e[2] - b[2] * e[0]) + a[2] * (b[0] * e[1] - b[1] * e[0]);
+    return a[0] * (b[1] * e[2] - b[2] * e[1]) - a[1] * (b[0] * e[2] - b[2] * e[0]) +
+           a[2] * (b[0] * e[1] - b[1] * e[0]);
   };
   c[0] = det(f, f + 3, f + 6);
   c[1] = det(d, f + 3, f + 6) + det(f, d + 3, f + 6) + det(f, f + 3, d + 6);
@@ -18,7 +19,8 @@ inline void determinant_along(const double* f, const double* d, double* c) {
   c[3] = det(d, d + 3, d + 6);
 }
 
-/// Smallest root of the cubic in (0, 1], +inf when it stays positive there. c[0] > 0 expected (0 is returned otherwise).
+/// Smallest root of the cubic in (0, 1], +inf when it stays positive there. c[0] > 0 expected (0 is returned
+/// otherwise).
 inline double first_root_in_unit(const double* c) {
   const double none = std::numeric_limits<double>::infinity();
   if (!(c[0] > 0)) return 0;

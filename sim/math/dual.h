@@ -2,8 +2,8 @@
 //
 //   f(a + ε·a′) = f(a) + ε·f′(a) a′
 //
-// The one scalar type through which laws are differentiated (stress → tangent, law → parameter and history blocks).
-// Eigen-free: included by files compiled for several instruction sets.
+// The one scalar type through which laws are differentiated (stress → tangent, law → parameter and history
+// blocks). Eigen-free: included by files compiled for several instruction sets.
 #pragma once
 
 #include <cmath>
@@ -15,8 +15,8 @@ inline namespace RHYTID_ISA {
 
 template <int N>
 struct Dual {
-  double v = 0;    ///< value
-  double d[N]{};   ///< derivatives along N directions
+  double v = 0;   ///< value
+  double d[N]{};  ///< derivatives along N directions
 
   Dual() = default;
   Dual(double value) : v(value) {}  // NOLINT: a constant is a dual with zero derivatives
@@ -103,20 +103,24 @@ struct Dual {
 };
 
 /// The value of a scalar, whatever its type.
-inline double value_of(double a) { return a; }
+inline double value_of(double a) {
+  return a;
+}
 template <int N>
 double value_of(const Dual<N>& a) {
   return a.v;
 }
 
-/// Derivative-free zero of a function that is only ever multiplied by something that vanishes at least as fast:
-/// √s with d√s := 0 at s = 0 (used for s·√s, whose derivative at 0 is 0).
-inline double sqrt_flat(double s) { return std::sqrt(s); }
+/// Derivative-free zero of a function that is only ever multiplied by something that vanishes at least as
+/// fast: √s with d√s := 0 at s = 0 (used for s·√s, whose derivative at 0 is 0).
+inline double sqrt_flat(double s) {
+  return std::sqrt(s);
+}
 template <int N>
 Dual<N> sqrt_flat(const Dual<N>& s) {
   if (s.v <= 0) return Dual<N>(0.0);
   return sqrt(s);
 }
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

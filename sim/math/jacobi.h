@@ -26,8 +26,8 @@ bool positive_definite(const double (*a)[N], double shift) {
   return true;
 }
 
-/// Replaces a symmetric matrix by the nearest positive semi-definite one (Frobenius): negative eigenvalues to zero.
-/// Unchanged when it is already positive semi-definite to 1e-12 of its trace norm.
+/// Replaces a symmetric matrix by the nearest positive semi-definite one (Frobenius): negative eigenvalues to
+/// zero. Unchanged when it is already positive semi-definite to 1e-12 of its trace norm.
 template <int N>
 void project_psd(double (*a)[N]) {
   double scale = 0;
@@ -77,5 +77,5 @@ void project_psd(double (*a)[N]) {
   }
 }
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

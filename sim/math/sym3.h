@@ -1,14 +1,14 @@
 // Symmetric 3×3 matrices and their matrix functions log(I+Y) and (I+Y)^t − I.
 //
-// Stored as 6 numbers in the order xx yy zz xy xz yz. Matrices near the identity are stored as Y = A − I, so that
-// small strains keep all their digits. Matrix functions are differentiated by divided differences in the sinh-quotient
-// form (no difference of nearly equal numbers, no derivative of an eigenvector):
+// Stored as 6 numbers in the order xx yy zz xy xz yz. Matrices near the identity are stored as Y = A − I, so
+// that small strains keep all their digits. Matrix functions are differentiated by divided differences in the
+// sinh-quotient form (no difference of nearly equal numbers, no derivative of an eigenvector):
 //
 //   log:  f[a,b] = e^(−m) δ / sinh δ,     power t:  f[a,b] = e^((t−1)m) sinh(tδ) / sinh δ,
 //   m, δ  mean and half difference of ln a and ln b.
 //
-// Source   DESIGN section 2; Daleckii-Krein. Units  dimensionless. Smooth  analytic for I+Y positive definite.
-// Tests    tests/sim/math/sym3_test.cpp
+// Source   DESIGN section 2; Daleckii-Krein. Units  dimensionless. Smooth  analytic for I+Y positive
+// definite. Tests    tests/sim/math/sym3_test.cpp
 #pragma once
 
 #include <cmath>
@@ -146,7 +146,8 @@ inline void compose(const Spectrum& s, const double* g, double* out) {
   }
 }
 
-/// d out = Q (f ∘ (Qᵀ dY Q)) Qᵀ for N directions at once; f holds the divided differences in symmetric storage.
+/// d out = Q (f ∘ (Qᵀ dY Q)) Qᵀ for N directions at once; f holds the divided differences in symmetric
+/// storage.
 template <int N>
 void frechet(const Spectrum& s, const double* f, const Dual<N>* y, Dual<N>* out) {
   double rotate[6][6];  // (Qᵀ dY Q)_c = Σ_e rotate[c][e] dY_e ; its transpose (with weights) rotates back
@@ -239,5 +240,5 @@ void geometric_mean(const T* a, const T* b, const T& t, T* out) {
   for (int c = 0; c < 6; ++c) out[c] += a[c];
 }
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

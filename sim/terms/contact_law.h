@@ -1,13 +1,17 @@
 // Penalty contact of a surface point with a rigid implicit shape, and the friction lagged from it; per area.
 //
 //   contact   Ψ = κ φ(d), d = g₀ − g(x):  d³/(3ε) below ε, ε²/3 + ε(d−ε) + (d−ε)² above (C², κ g² for ε → 0)
-//   friction  Ψ = μ f_n D(|u_T|; ε_v dt), u_T = (I − n nᵀ)(u − u_old − (c − c_old)); f_n, n from the last converged step
-//             quintic   D = δ⁶/ε⁵ − 3δ⁵/ε⁴ + 5δ⁴/(2ε³) | δ − ε/2 ;  quadratic (IPC)  δ²/ε − δ³/(3ε²) | δ − ε/3
+//   friction  Ψ = μ f_n D(|u_T|; ε_v dt), u_T = (I − n nᵀ)(u − u_old − (c − c_old)); f_n, n from the last
+//   converged step
+//             quintic   D = δ⁶/ε⁵ − 3δ⁵/ε⁴ + 5δ⁴/(2ε³) | δ − ε/2 ;  quadratic (IPC)  δ²/ε − δ³/(3ε²) | δ −
+//             ε/3
 //
-// The shape gives value, gradient and Hessian of its gap in plain numbers; other scalars are lifted through them, so a
-// new shape needs nothing here. `inflation` [mm] is the amount by which the radius differs from the shape's own.
+// The shape gives value, gradient and Hessian of its gap in plain numbers; other scalars are lifted through
+// them, so a new shape needs nothing here. `inflation` [mm] is the amount by which the radius differs from
+// the shape's own.
 //
-// Source   paper.tex "Contact", "Friction"; deviations: κ in MPa/mm, C² onset, rest gap g₀ subtracted on the base,
+// Source   paper.tex "Contact", "Friction"; deviations: κ in MPa/mm, C² onset, rest gap g₀ subtracted on the
+// base,
 //          friction on the displacement of the step (the velocity form as printed is 1/dt too strong).
 // Units    κ [MPa/mm], ε [mm], f_n [MPa], u, c [mm], ε_v [mm/s].
 // Shapes   contact θ = κ, inflation, c [3]; friction θ = κ, inflation, μ, c [3], c_old [3]; lag = f_n, n [3].
@@ -44,8 +48,8 @@ LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* x_local) {
   const T dx[3] = {x_local[0] - x0[0], x_local[1] - x0[1], x_local[2] - x0[2]};
   r.gap = T(jet.gap) + dx[0] * jet.gradient[0] + dx[1] * jet.gradient[1] + dx[2] * jet.gradient[2];
   for (int i = 0; i < 3; ++i)
-    r.gradient[i] =
-        T(jet.gradient[i]) + dx[0] * jet.hessian(i, 0) + dx[1] * jet.hessian(i, 1) + dx[2] * jet.hessian(i, 2);
+    r.gradient[i] = T(jet.gradient[i]) + dx[0] * jet.hessian(i, 0) + dx[1] * jet.hessian(i, 1) +
+                    dx[2] * jet.hessian(i, 2);
   return r;
 }
 
@@ -94,8 +98,8 @@ struct FrictionLaw {
   static constexpr int ne = 3, ns = 4, np = 7, ntheta = 9, nrest = 4;
   static constexpr const char* name = "friction";
   const ImplicitShape* shape = nullptr;
-  double onset = 1e-3;       ///< mm, as in the contact it belongs to
-  double slip_speed = 1;     ///< ε_v, mm/s
+  double onset = 1e-3;    ///< mm, as in the contact it belongs to
+  double slip_speed = 1;  ///< ε_v, mm/s
   Mollifier mollifier = Mollifier::quintic;
 
   /// D(δ; ε) and D'(δ)/δ from s = δ².
@@ -160,5 +164,5 @@ struct FrictionLaw {
   }
 };
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

@@ -4,10 +4,10 @@
 //   during it         energy  weight · ψ_m(trial)
 //   after it          C^v ← C^v #_post C̄
 //
-//   exponential    β = (1−α)/r:  pre 1 − α/β, weight β, post 1 − β   second order, exact at constant rate (default)
-//   literal        pre 0, weight α, post 1 − α                       first order, as printed in the publication
-//   strang         pre 1 − √α, weight √α, post 1 − √α                second order
-//   backward_euler pre 0, weight 1/(1+r), post r/(1+r)               first order
+//   exponential    β = (1−α)/r:  pre 1 − α/β, weight β, post 1 − β   second order, exact at constant rate
+//   (default) literal        pre 0, weight α, post 1 − α                       first order, as printed in the
+//   publication strang         pre 1 − √α, weight √α, post 1 − √α                second order backward_euler
+//   pre 0, weight 1/(1+r), post r/(1+r)               first order
 //
 // Source   paper.tex "Viscous Time Integration"; DESIGN section 2.
 // Tests    tests/sim/terms/skin_law_test.cpp (DamperOrder)
@@ -44,16 +44,19 @@ Damper<T> damper(DamperScheme scheme, const T& tau, double dt) {
       const T beta = -expm1(-r) / r;
       return {1.0 - exp(-r) / beta, beta, 1.0 - beta};
     }
-    case DamperScheme::literal: return {T(0.0), exp(-r), -expm1(-r)};
+    case DamperScheme::literal:
+      return {T(0.0), exp(-r), -expm1(-r)};
     case DamperScheme::strang: {
       const T half = -expm1(-0.5 * r);
       return {half, 1.0 - half, half};
     }
-    case DamperScheme::backward_euler: return {T(0.0), 1.0 / (1.0 + r), r / (1.0 + r)};
-    case DamperScheme::none: break;
+    case DamperScheme::backward_euler:
+      return {T(0.0), 1.0 / (1.0 + r), r / (1.0 + r)};
+    case DamperScheme::none:
+      break;
   }
   return {T(0.0), T(1.0), T(0.0)};
 }
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

@@ -8,8 +8,8 @@
 
 namespace rhytid {
 
-TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab, const TriangleRule& rule,
-                      int thickness_points) {
+TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab,
+                      const TriangleRule& rule, int thickness_points) {
   const TriangleBasis triangle(mesh.order);
   const ElementLayer& layer = mesh.element_layers[element_layer];
   const LineBasis line(layer.order);
@@ -51,8 +51,8 @@ TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSla
       }
       const double det = jacobian.determinant();
       if (!(det > 0))
-        throw InputError("mesh " + mesh.surface.origin + ": face " + std::to_string(face), "an inverted element",
-                         "a positive volume; thin the layers or smooth the surface");
+        throw InputError("mesh " + mesh.surface.origin + ": face " + std::to_string(face),
+                         "an inverted element", "a positive volume; thin the layers or smooth the surface");
       const Mat3 inverse = jacobian.inverse();
       const std::size_t at = static_cast<std::size_t>(face) * g.num_points + qi;
       for (int r = 0; r < 3; ++r)
@@ -77,7 +77,8 @@ TermGroup surface_group(const SkinMesh& mesh, SkinSide side, const TriangleRule&
   std::vector<std::array<double, 3>> local_weights(g.num_points);
   const auto local_node = [&](int i, int j) {
     const auto& lattice = triangle.lattice();
-    return static_cast<int>(std::find(lattice.begin(), lattice.end(), std::array<int, 2>{i, j}) - lattice.begin());
+    return static_cast<int>(std::find(lattice.begin(), lattice.end(), std::array<int, 2>{i, j}) -
+                            lattice.begin());
   };
   for (int q = 0; q < g.num_points; ++q) {
     const TrianglePoint& point = rule.points[q];

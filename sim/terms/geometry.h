@@ -1,4 +1,5 @@
-// Quadrature points on the prism mesh: reference tables, Jacobians and weights of the element groups of a term.
+// Quadrature points on the prism mesh: reference tables, Jacobians and weights of the element groups of a
+// term.
 #pragma once
 
 #include "sim/element/quadrature.h"
@@ -7,15 +8,16 @@
 
 namespace rhytid {
 
-/// Points of one material slab in one element layer: triangle rule × Gauss-Legendre of `thickness_points` in the slab.
-/// Everything but theta is filled. Throws InputError when an element is inverted at a point (names the face).
-TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab, const TriangleRule& rule,
-                      int thickness_points);
+/// Points of one material slab in one element layer: triangle rule × Gauss-Legendre of `thickness_points` in
+/// the slab. Everything but theta is filled. Throws InputError when an element is inverted at a point (names
+/// the face).
+TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab,
+                      const TriangleRule& rule, int thickness_points);
 
 enum class SkinSide { inner, outer };
 
-/// Points of the inner or outer surface; rest = X [3] and a fourth number left 0 (rest gap), field weights on columns by
-/// linear interpolation on the P1 refinement. theta and rest[3] are the caller's.
+/// Points of the inner or outer surface; rest = X [3] and a fourth number left 0 (rest gap), field weights on
+/// columns by linear interpolation on the P1 refinement. theta and rest[3] are the caller's.
 TermGroup surface_group(const SkinMesh& mesh, SkinSide side, const TriangleRule& rule);
 
 }  // namespace rhytid

@@ -1,5 +1,5 @@
-// The element kernels of one law as plain function pointers, so that the same law compiled for several instruction
-// sets can be chosen at run time and terms need not be templates.
+// The element kernels of one law as plain function pointers, so that the same law compiled for several
+// instruction sets can be chosen at run time and terms need not be templates.
 #pragma once
 
 #include "sim/terms/point_kernel.h"
@@ -10,19 +10,20 @@ namespace rhytid {
 struct KernelTable {
   const char* name;
   int ne, ns, np, ntheta, nrest, rows;
-  void (*prepare)(const void* law, const ElementView&, const double* u_old, const double* s_old, double* prepared);
+  void (*prepare)(const void* law, const ElementView&, const double* u_old, const double* s_old,
+                  double* prepared);
   double (*energy)(const void* law, const ElementView&, const double* u, const double* prepared, double* f);
-  bool (*hessian)(const void* law, const ElementView&, const double* u, const double* prepared, bool projected,
-                  double* work, double* dense);
+  bool (*hessian)(const void* law, const ElementView&, const double* u, const double* prepared,
+                  bool projected, double* work, double* dense);
   void (*update)(const void* law, const ElementView&, const double* u, const double* prepared, double* s_new);
-  void (*tangent)(const void* law, const ElementView&, const double* u, const double* u_old, const double* s_old,
-                  const double* du, const double* du_old, const double* ds_old, const double* dtheta, double* df,
-                  double* ds_new);
+  void (*tangent)(const void* law, const ElementView&, const double* u, const double* u_old,
+                  const double* s_old, const double* du, const double* du_old, const double* ds_old,
+                  const double* dtheta, double* df, double* ds_new);
   void (*adjoint_update)(const void* law, const ElementView&, const double* u, const double* prepared,
                          const double* s_bar, double* u_bar);
-  void (*adjoint_step)(const void* law, const ElementView&, const double* u, const double* u_old, const double* s_old,
-                       const double* prepared, const double* adj, const double* s_bar, double* u_old_bar,
-                       double* s_old_bar, double* theta_bar);
+  void (*adjoint_step)(const void* law, const ElementView&, const double* u, const double* u_old,
+                       const double* s_old, const double* prepared, const double* adj, const double* s_bar,
+                       double* u_old_bar, double* s_old_bar, double* theta_bar);
 };
 
 inline namespace RHYTID_ISA {
@@ -31,32 +32,37 @@ inline namespace RHYTID_ISA {
 template <class Law, class Kin>
 constexpr KernelTable kernel_table() {
   using K = PointKernel<Law, Kin>;
-  return {Law::name, Law::ne, Law::ns, Law::np, Law::ntheta, Law::nrest, Kin::rows,
-          [](const void* l, const ElementView& v, const double* uo, const double* so, double* p) {
-            K::prepare(*static_cast<const Law*>(l), v, uo, so, p);
-          },
-          [](const void* l, const ElementView& v, const double* u, const double* p, double* f) {
-            return K::energy(*static_cast<const Law*>(l), v, u, p, f);
-          },
-          [](const void* l, const ElementView& v, const double* u, const double* p, bool projected, double* work,
-             double* dense) { return K::hessian(*static_cast<const Law*>(l), v, u, p, projected, work, dense); },
-          [](const void* l, const ElementView& v, const double* u, const double* p, double* s) {
-            K::update(*static_cast<const Law*>(l), v, u, p, s);
-          },
-          [](const void* l, const ElementView& v, const double* u, const double* uo, const double* so, const double* du,
-             const double* duo, const double* dso, const double* dt, double* df, double* ds) {
-            K::tangent(*static_cast<const Law*>(l), v, u, uo, so, du, duo, dso, dt, df, ds);
-          },
-          [](const void* l, const ElementView& v, const double* u, const double* p, const double* sb, double* ub) {
-            K::adjoint_update(*static_cast<const Law*>(l), v, u, p, sb, ub);
-          },
-          [](const void* l, const ElementView& v, const double* u, const double* uo, const double* so, const double* p,
-             const double* adj, const double* sb, double* uob, double* sob, double* tb) {
-            K::adjoint_step(*static_cast<const Law*>(l), v, u, uo, so, p, adj, sb, uob, sob, tb);
-          }};
+  return {
+      Law::name,
+      Law::ne,
+      Law::ns,
+      Law::np,
+      Law::ntheta,
+      Law::nrest,
+      Kin::rows,
+      [](const void* l, const ElementView& v, const double* uo, const double* so, double* p) {
+        K::prepare(*static_cast<const Law*>(l), v, uo, so, p);
+      },
+      [](const void* l, const ElementView& v, const double* u, const double* p, double* f) {
+        return K::energy(*static_cast<const Law*>(l), v, u, p, f);
+      },
+      [](const void* l, const ElementView& v, const double* u, const double* p, bool projected, double* work,
+         double* dense) { return K::hessian(*static_cast<const Law*>(l), v, u, p, projected, work, dense); },
+      [](const void* l, const ElementView& v, const double* u, const double* p, double* s) {
+        K::update(*static_cast<const Law*>(l), v, u, p, s);
+      },
+      [](const void* l, const ElementView& v, const double* u, const double* uo, const double* so,
+         const double* du, const double* duo, const double* dso, const double* dt, double* df,
+         double* ds) { K::tangent(*static_cast<const Law*>(l), v, u, uo, so, du, duo, dso, dt, df, ds); },
+      [](const void* l, const ElementView& v, const double* u, const double* p, const double* sb,
+         double* ub) { K::adjoint_update(*static_cast<const Law*>(l), v, u, p, sb, ub); },
+      [](const void* l, const ElementView& v, const double* u, const double* uo, const double* so,
+         const double* p, const double* adj, const double* sb, double* uob, double* sob, double* tb) {
+        K::adjoint_step(*static_cast<const Law*>(l), v, u, uo, so, p, adj, sb, uob, sob, tb);
+      }};
 }
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 
 /// Prism kernels of viscoelastic and elastic skin for the best instruction set of this machine.
 const KernelTable& skin_kernels();

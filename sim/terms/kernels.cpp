@@ -32,13 +32,23 @@ bool use_avx2() {
 }  // namespace
 
 #ifdef RHYTID_HAVE_AVX2
-const KernelTable& skin_kernels() { return use_avx2() ? skin_table_avx2 : skin_table_baseline; }
-const KernelTable& elastic_skin_kernels() { return use_avx2() ? elastic_table_avx2 : elastic_table_baseline; }
+const KernelTable& skin_kernels() {
+  return use_avx2() ? skin_table_avx2 : skin_table_baseline;
+}
+const KernelTable& elastic_skin_kernels() {
+  return use_avx2() ? elastic_table_avx2 : elastic_table_baseline;
+}
 #else
-const KernelTable& skin_kernels() { return skin_table_baseline; }
-const KernelTable& elastic_skin_kernels() { return elastic_table_baseline; }
+const KernelTable& skin_kernels() {
+  return skin_table_baseline;
+}
+const KernelTable& elastic_skin_kernels() {
+  return elastic_table_baseline;
+}
 #endif
-const char* skin_kernel_isa() { return use_avx2() ? "avx2" : "baseline"; }
+const char* skin_kernel_isa() {
+  return use_avx2() ? "avx2" : "baseline";
+}
 
 const KernelTable& ligament_kernels() {
   static constexpr KernelTable table = kernel_table<LigamentLaw, SurfaceKinematics>();

@@ -2,9 +2,10 @@
 //
 //   Ψ = k/b (e^(b s) − 1),   s = √(d² + ε²) − ε,   d = |u|,   traction = k e^(b s) u / √(d² + ε²)
 //
-// Source   paper.tex "Ligaments"; deviation: the printed law is the limit ε → 0, whose force is k at zero displacement
-//          (a cusp no gradient method can stop on); ε is a length, reported. Beyond b s = 50 the exponential is
-//          continued by its tangent, so that trial steps stay finite.
+// Source   paper.tex "Ligaments"; deviation: the printed law is the limit ε → 0, whose force is k at zero
+// displacement
+//          (a cusp no gradient method can stop on); ε is a length, reported. Beyond b s = 50 the exponential
+//          is continued by its tangent, so that trial steps stay finite.
 // Units    k [MPa], b [1/mm], ε [mm], u [mm]; Ψ [mJ/mm²].     Shapes  e = u [3], θ = k, ε, b.
 // Smooth   analytic below b s = 50, C¹ in the force there.
 // Tests    tests/sim/terms/ligament_law_test.cpp
@@ -56,5 +57,5 @@ struct LigamentLaw {
   void update(const T*, const T*, const T*, const double*, double, T*) const {}
 };
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

@@ -5,9 +5,9 @@
 //   Hessian      Zᵀ [ (∂e/∂z)ᵀ (∂σ/∂e) (∂e/∂z) + σ·∂²e/∂z² ] Z
 //   cross blocks derivatives of σ and of the history update by old state and parameters, with dual numbers
 //
-// A law supplies prepare, stress and update, templated on the scalar (skin_law.h is the richest example); everything
-// else, tangent and adjoint blocks included, is here and knows no physics. Eigen-free: the prism kernels are compiled
-// once per instruction set.
+// A law supplies prepare, stress and update, templated on the scalar (skin_law.h is the richest example);
+// everything else, tangent and adjoint blocks included, is here and knows no physics. Eigen-free: the prism
+// kernels are compiled once per instruction set.
 //
 // Shapes   natural gradients table [q·R + r][npad], R = 3 on prisms, 1 on surfaces; element vectors [n][3].
 // Tests    tests/sim/terms/point_term_test.cpp
@@ -29,17 +29,17 @@ inline constexpr int kHessianRows = 24;
 
 /// Everything an element kernel reads, as plain pointers (see the shapes above; null where a law has none).
 struct ElementView {
-  int num_nodes, padded_nodes;   ///< n, npad (multiple of 8)
-  int num_points;                ///< nq
-  int padded_rows;               ///< length of a row of `rows_by_node`, ≥ nq·R, multiple of 8
-  const double* node_by_row;     ///< [nq·R][npad]
-  const double* rows_by_node;    ///< [n][padded_rows], the transpose
-  const double* inverse_jacobian;///< prisms: [nq][3][3] ∂ξ_r/∂X_I; surfaces: null
-  const double* weight;          ///< [nq] integration weight, mm³ or mm²
-  const double* rest;            ///< [nq][nrest]
-  const double* theta;           ///< [nq][ntheta], or one row when theta_stride = 0
+  int num_nodes, padded_nodes;     ///< n, npad (multiple of 8)
+  int num_points;                  ///< nq
+  int padded_rows;                 ///< length of a row of `rows_by_node`, ≥ nq·R, multiple of 8
+  const double* node_by_row;       ///< [nq·R][npad]
+  const double* rows_by_node;      ///< [n][padded_rows], the transpose
+  const double* inverse_jacobian;  ///< prisms: [nq][3][3] ∂ξ_r/∂X_I; surfaces: null
+  const double* weight;            ///< [nq] integration weight, mm³ or mm²
+  const double* rest;              ///< [nq][nrest]
+  const double* theta;             ///< [nq][ntheta], or one row when theta_stride = 0
   int theta_stride;
-  double dt;                     ///< s
+  double dt;  ///< s
 };
 
 inline namespace RHYTID_ISA {
@@ -57,8 +57,7 @@ struct PrismKinematics {
   /// det F − 1 from H.
   static double det_minus_one_of(const double* h) {
     const double tr = h[0] + h[4] + h[8];
-    const double minors =
-        h[0] * h[4] - h[1] * h[3] + h[0] * h[8] - h[2] * h[6] + h[4] * h[8] - h[5] * h[7];
+    const double minors = h[0] * h[4] - h[1] * h[3] + h[0] * h[8] - h[2] * h[6] + h[4] * h[8] - h[5] * h[7];
     const double det = h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) +
                        h[2] * (h[3] * h[7] - h[4] * h[6]);
     return tr + minors + det;
@@ -88,7 +87,8 @@ struct PrismKinematics {
   static void to_point(const double* natural, const double* ji, double* h) {
     for (int a = 0; a < 3; ++a)
       for (int i = 0; i < 3; ++i)
-        h[3 * a + i] = natural[3 * a] * ji[i] + natural[3 * a + 1] * ji[3 + i] + natural[3 * a + 2] * ji[6 + i];
+        h[3 * a + i] =
+            natural[3 * a] * ji[i] + natural[3 * a + 1] * ji[3 + i] + natural[3 * a + 2] * ji[6 + i];
   }
   static void from_point(const double* p, const double* ji, double weight, double* natural) {
     for (int a = 0; a < 3; ++a)
@@ -116,8 +116,8 @@ struct SurfaceKinematics {
   }
 };
 
-/// C[i][j] += Σ_k A[k][i] B[k][j], all rows padded to `n8` (multiple of 8); only columns j ≥ from(i) are formed when
-/// `upper` (symmetric blocks).
+/// C[i][j] += Σ_k A[k][i] B[k][j], all rows padded to `n8` (multiple of 8); only columns j ≥ from(i) are
+/// formed when `upper` (symmetric blocks).
 inline void multiply_add(const double* a, const double* b, int rows, int n8, bool upper, double* c) {
   typedef double Lanes __attribute__((vector_size(32), aligned(8), may_alias));
   for (int i = 0; i < n8; i += 4)
@@ -149,13 +149,18 @@ inline void multiply_add(const double* a, const double* b, int rows, int n8, boo
 /// Element kernels of a law on a kinematics. All pointers are per element; see ElementView for shapes.
 template <class Law, class Kin>
 struct PointKernel {
-  static constexpr int ne = Law::ne, nz = Kin::nz, ns = Law::ns, np = Law::np, nt = Law::ntheta, R = Kin::rows;
+  static constexpr int ne = Law::ne, nz = Kin::nz, ns = Law::ns, np = Law::np, nt = Law::ntheta,
+                       R = Kin::rows;
   static_assert(Law::ne == Kin::ne);
   static constexpr int max_rows = 3 * 200;  ///< nq·R at most
   static constexpr int at_least_one(int n) { return n > 0 ? n : 1; }
 
-  static const double* theta(const ElementView& v, int q) { return v.theta + static_cast<std::size_t>(q) * v.theta_stride; }
-  static const double* rest(const ElementView& v, int q) { return v.rest ? v.rest + q * Law::nrest : nullptr; }
+  static const double* theta(const ElementView& v, int q) {
+    return v.theta + static_cast<std::size_t>(q) * v.theta_stride;
+  }
+  static const double* rest(const ElementView& v, int q) {
+    return v.rest ? v.rest + q * Law::nrest : nullptr;
+  }
 
   /// natural[a][row] = Σ_i u[i][a] table[row][i].
   static void gather(const ElementView& v, const double* u, double (*natural)[max_rows]) {
@@ -199,7 +204,8 @@ struct PointKernel {
   }
 
   /// prepared[nq][np] from the old state.
-  static void prepare(const Law& law, const ElementView& v, const double* u_old, const double* s_old, double* prepared) {
+  static void prepare(const Law& law, const ElementView& v, const double* u_old, const double* s_old,
+                      double* prepared) {
     if constexpr (np > 0) {
       double natural[3][max_rows], z[nz], e[ne];
       gather(v, u_old, natural);
@@ -212,14 +218,16 @@ struct PointKernel {
   }
 
   /// Energy; adds to f[n][3] unless null. +inf outside the domain (f is then meaningless).
-  static double energy(const Law& law, const ElementView& v, const double* u, const double* prepared, double* f) {
+  static double energy(const Law& law, const ElementView& v, const double* u, const double* prepared,
+                       double* f) {
     double natural[3][max_rows], out[3][max_rows], z[nz], e[ne], sigma[ne], total = 0;
     gather(v, u, natural);
     for (int q = 0; q < v.num_points; ++q) {
       point(v, natural, q, z);
       if (!Kin::feasible(z)) return std::numeric_limits<double>::infinity();
       Kin::strain(z, e);
-      const double psi = law.template stress<double>(e, prepared + q * np, theta(v, q), rest(v, q), v.dt, sigma);
+      const double psi =
+          law.template stress<double>(e, prepared + q * np, theta(v, q), rest(v, q), v.dt, sigma);
       if (!std::isfinite(psi)) return std::numeric_limits<double>::infinity();
       total += v.weight[q] * psi;
       if (!f) continue;
@@ -235,12 +243,12 @@ struct PointKernel {
     return total;
   }
 
-  /// Dense Hessian [3n][3n], node-major, full. False when it is zero. `work` holds 6·npad² + 6·kHessianRows·npad +
-  /// kHessianRows·npad doubles.
-  static bool hessian(const Law& law, const ElementView& v, const double* u, const double* prepared, bool projected,
-                      double* work, double* dense) {
+  /// Dense Hessian [3n][3n], node-major, full. False when it is zero. `work` holds 6·npad² +
+  /// 6·kHessianRows·npad + kHessianRows·npad doubles.
+  static bool hessian(const Law& law, const ElementView& v, const double* u, const double* prepared,
+                      bool projected, double* work, double* dense) {
     const int n8 = v.padded_nodes, n = v.num_nodes;
-    double* blocks = work;                                    // 6 blocks (a ≤ b) [npad][npad]
+    double* blocks = work;                                       // 6 blocks (a ≤ b) [npad][npad]
     double* t = blocks + 6 * static_cast<std::size_t>(n8) * n8;  // 6 × [kHessianRows][npad]
     double* g = t + 6 * static_cast<std::size_t>(kHessianRows) * n8;
     double natural[3][max_rows], z[nz], e[ne];
@@ -301,7 +309,8 @@ struct PointKernel {
         for (int i = 0; i < nz; ++i) folded[i][j] = mapped[i];
       }
       const double* table = v.node_by_row + static_cast<std::size_t>(q) * R * n8;
-      std::memcpy(g + static_cast<std::size_t>(filled) * n8, table, sizeof(double) * R * static_cast<std::size_t>(n8));
+      std::memcpy(g + static_cast<std::size_t>(filled) * n8, table,
+                  sizeof(double) * R * static_cast<std::size_t>(n8));
       int block = 0;
       for (int ca = 0; ca < 3; ++ca)
         for (int cb = ca; cb < 3; ++cb, ++block)
@@ -334,7 +343,8 @@ struct PointKernel {
   }
 
   /// New history [nq][ns].
-  static void update(const Law& law, const ElementView& v, const double* u, const double* prepared, double* s_new) {
+  static void update(const Law& law, const ElementView& v, const double* u, const double* prepared,
+                     double* s_new) {
     if constexpr (ns > 0) {
       double natural[3][max_rows], z[nz], e[ne];
       gather(v, u, natural);
@@ -374,12 +384,12 @@ struct PointKernel {
     }
   }
 
-  /// Directional derivatives along (du, du_old [n][3][8], ds_old [nq][ns][8], dtheta [nq][nt][8]); any may be null.
-  /// Adds the residual's derivative at fixed u to df [n][3][8] when df is given; writes the history update's derivative
-  /// ds_new [nq][ns][8] (with du) when ds_new is given.
-  static void tangent(const Law& law, const ElementView& v, const double* u, const double* u_old, const double* s_old,
-                      const double* du, const double* du_old, const double* ds_old, const double* dtheta, double* df,
-                      double* ds_new) {
+  /// Directional derivatives along (du, du_old [n][3][8], ds_old [nq][ns][8], dtheta [nq][nt][8]); any may be
+  /// null. Adds the residual's derivative at fixed u to df [n][3][8] when df is given; writes the history
+  /// update's derivative ds_new [nq][ns][8] (with du) when ds_new is given.
+  static void tangent(const Law& law, const ElementView& v, const double* u, const double* u_old,
+                      const double* s_old, const double* du, const double* du_old, const double* ds_old,
+                      const double* dtheta, double* df, double* ds_new) {
     double natural[3][max_rows], natural_old[3][max_rows];
     gather(v, u, natural);
     gather(v, u_old, natural_old);
@@ -421,7 +431,8 @@ struct PointKernel {
           Directions s_new[ns];
           seed_strain(v, natural, du, q, e);
           law.template update<Directions>(e, prepared, th, rest(v, q), v.dt, s_new);
-          for (int c = 0; c < ns; ++c) std::memcpy(ds_new + (q * ns + c) * kDirections, s_new[c].d, sizeof s_new[c].d);
+          for (int c = 0; c < ns; ++c)
+            std::memcpy(ds_new + (q * ns + c) * kDirections, s_new[c].d, sizeof s_new[c].d);
         }
       }
     }
@@ -449,7 +460,8 @@ struct PointKernel {
           for (int k = 0; k < ns; ++k) bar += s_bar[q * ns + k] * s_new[k].d[c];
           for (int i = 0; i < nz; ++i) p[i] += bar * b[c][i];
         }
-        for (int i = 0; i < nz; ++i) p[i] /= v.weight[q];  // put_point multiplies by the weight; this sum has none
+        for (int i = 0; i < nz; ++i)
+          p[i] /= v.weight[q];  // put_point multiplies by the weight; this sum has none
         put_point(v, p, q, out);
       }
       scatter(v, out, u_bar);
@@ -459,8 +471,8 @@ struct PointKernel {
   /// Transposed cross blocks of φ = −λ·R + s_bar·s_new at fixed u: adds ∂φ/∂u_old to u_old_bar [n][3], writes
   /// ∂φ/∂s_old to s_old_bar [nq][ns] and ∂φ/∂θ to theta_bar [nq][nt].
   static void adjoint_step(const Law& law, const ElementView& v, const double* u, const double* u_old,
-                           const double* s_old, const double* prepared, const double* adj, const double* s_bar,
-                           double* u_old_bar, double* s_old_bar, double* theta_bar) {
+                           const double* s_old, const double* prepared, const double* adj,
+                           const double* s_bar, double* u_old_bar, double* s_old_bar, double* theta_bar) {
     constexpr int nd = np + nt, no = ne + ns + nt;
     double natural[3][max_rows], natural_old[3][max_rows], natural_adj[3][max_rows], out[3][max_rows];
     gather(v, u, natural);
@@ -525,5 +537,5 @@ struct PointKernel {
   }
 };
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

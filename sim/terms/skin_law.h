@@ -4,15 +4,15 @@
 //   Ē = dev ½ ln C,   Ē_e = dev ½ ln X,   X = L⁻¹ C L⁻ᵀ,   Ĉ^v = L Lᵀ the pre-relaxed viscous history
 //   S = 2 ∂ψ/∂C = [ 2 μ∞ e^(Cq) Ē + 2 w μ_m L⁻ᵀ Ē_e Lᵀ + K (J−1) J I ] C⁻¹
 //
-// Only eigenvalues of C and of C (C^v)⁻¹ enter, so C^v = F^vᵀ F^v (6 numbers, det 1) is the whole history; it is
-// kept as C^v − I, and strain as Y = C − I, so that the rest state is exact.
+// Only eigenvalues of C and of C (C^v)⁻¹ enter, so C^v = F^vᵀ F^v (6 numbers, det 1) is the whole history; it
+// is kept as C^v − I, and strain as Y = C − I, so that the rest state is exact.
 //
-// Source   paper.tex "Material Modeling", "Viscous Time Integration"; deviation: C^v instead of F^v (identical to
+// Source   paper.tex "Material Modeling", "Viscous Time Integration"; deviation: C^v instead of F^v
+// (identical to
 //          round-off), damper schemes other than `literal` (DESIGN section 2).
 // Units    μ∞, μ_m, K [MPa], C [1], τ [s], dt [s]; ψ [MPa = mJ/mm³].
-// Shapes   e = Y [6] (xx yy zz xy xz yz), σ = ∂ψ/∂Y [6] (off-diagonal entries count both halves), history C^v − I [6].
-// Smooth   analytic for J > 0; the caller rejects J ≤ 0.
-// Tests    tests/sim/terms/skin_law_test.cpp
+// Shapes   e = Y [6] (xx yy zz xy xz yz), σ = ∂ψ/∂Y [6] (off-diagonal entries count both halves), history C^v
+// − I [6]. Smooth   analytic for J > 0; the caller rejects J ≤ 0. Tests    tests/sim/terms/skin_law_test.cpp
 #pragma once
 
 #include "sim/math/sym3.h"
@@ -77,7 +77,8 @@ void stress_from(const T (*a)[3], const T* y, T* sigma) {
     if (c < 3) {
       sigma[c] = 0.5 * sij;
     } else {
-      const T sji = a[j][0] * inverse[kSym[0][i]] + a[j][1] * inverse[kSym[1][i]] + a[j][2] * inverse[kSym[2][i]];
+      const T sji =
+          a[j][0] * inverse[kSym[0][i]] + a[j][1] * inverse[kSym[1][i]] + a[j][2] * inverse[kSym[2][i]];
       sigma[c] = 0.5 * (sij + sji);  // both halves of ½ S
     }
   }
@@ -90,7 +91,8 @@ struct SkinLaw {
   DamperScheme scheme = DamperScheme::exponential;
 
   template <class T>
-  void prepare(const T* y_old, const T* history, const T* theta, const double*, double dt, T* prepared) const {
+  void prepare(const T* y_old, const T* history, const T* theta, const double*, double dt,
+               T* prepared) const {
     const Damper<T> d = damper(scheme, theta[SkinTheta::tau], dt);
     if (scheme == DamperScheme::exponential || scheme == DamperScheme::strang) {
       T ybar[6];
@@ -162,5 +164,5 @@ struct ElasticSkinLaw {
   void update(const T*, const T*, const T*, const double*, double, T*) const {}
 };
 
-}  // inline namespace RHYTID_ISA
+}  // namespace RHYTID_ISA
 }  // namespace rhytid

@@ -13,13 +13,16 @@ namespace rhytid {
 
 namespace {
 
-constexpr int round_up8(int n) { return (n + 7) / 8 * 8; }
+constexpr int round_up8(int n) {
+  return (n + 7) / 8 * 8;
+}
 
 /// Nodal values of an element, [n][width].
 void gather_nodes(const TermGroup& g, int element, const double* field, int width, double* local) {
   const int* nodes = g.nodes.data() + static_cast<std::size_t>(element) * g.num_nodes;
   for (int i = 0; i < g.num_nodes; ++i)
-    std::memcpy(local + i * width, field + static_cast<std::size_t>(nodes[i]) * width, sizeof(double) * width);
+    std::memcpy(local + i * width, field + static_cast<std::size_t>(nodes[i]) * width,
+                sizeof(double) * width);
 }
 
 void scatter_add(const TermGroup& g, int element, const double* local, int width, double* field) {
@@ -91,13 +94,18 @@ std::vector<std::vector<double>> Term::load_theta(const StepInfo& step, const Ve
     for (int s = 0; s < nt; ++s) {
       const ThetaSlot& slot = g.theta[s];
       switch (slot.kind) {
-        case ThetaSlot::Kind::constant: row[s] = native[slot.offset]; break;
-        case ThetaSlot::Kind::field: field_slot = s; break;
+        case ThetaSlot::Kind::constant:
+          row[s] = native[slot.offset];
+          break;
+        case ThetaSlot::Kind::field:
+          field_slot = s;
+          break;
         case ThetaSlot::Kind::path_now:
         case ThetaSlot::Kind::path_old: {
           const PathWeights w =
               path_weights(slot.knot_times, slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old);
-          row[s] = w.weight[0] * native[slot.offset + 3 * w.knot[0]] + w.weight[1] * native[slot.offset + 3 * w.knot[1]];
+          row[s] = w.weight[0] * native[slot.offset + 3 * w.knot[0]] +
+                   w.weight[1] * native[slot.offset + 3 * w.knot[1]];
         }
       }
     }
@@ -112,14 +120,16 @@ std::vector<std::vector<double>> Term::load_theta(const StepInfo& step, const Ve
     for (std::size_t q = 0; q < points; ++q) {
       std::copy(row.begin(), row.end(), theta.begin() + q * nt);
       double value = 0;
-      for (int k = 0; k < 3; ++k) value += g.field_weights[3 * q + k] * native[offset + g.field_columns[3 * q + k]];
+      for (int k = 0; k < 3; ++k)
+        value += g.field_weights[3 * q + k] * native[offset + g.field_columns[3 * q + k]];
       theta[q * nt + field_slot] = value;
     }
   }
   return result;
 }
 
-void Term::add_theta_transpose(const StepInfo& step, const std::vector<double>& theta_bar, VectorXd& native_bar) const {
+void Term::add_theta_transpose(const StepInfo& step, const std::vector<double>& theta_bar,
+                               VectorXd& native_bar) const {
   const int nt = kernels_->ntheta;
   for (const TermGroup& g : groups_) {
     const std::size_t points = static_cast<std::size_t>(g.num_elements) * g.num_points;
@@ -129,7 +139,8 @@ void Term::add_theta_transpose(const StepInfo& step, const std::vector<double>& 
       if (slot.kind == ThetaSlot::Kind::field) {
         for (std::size_t q = 0; q < points; ++q)
           for (int k = 0; k < 3; ++k)
-            native_bar[slot.offset + g.field_columns[3 * q + k]] += g.field_weights[3 * q + k] * bar[q * nt + s];
+            native_bar[slot.offset + g.field_columns[3 * q + k]] +=
+                g.field_weights[3 * q + k] * bar[q * nt + s];
         continue;
       }
       double sum = 0;
@@ -155,9 +166,10 @@ void Term::prepare(const StepInfo& step, const VectorXd& native, const VectorXd&
     parallel_for(g.num_elements, [&](int e) {
       double local[3 * 80];
       gather_nodes(g, e, u_old.data(), 3, local);
-      const std::size_t p = static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
-      kernels_->prepare(law_.get(), view(g, static_cast<int>(gi), e, step, data), local, s_old + p * kernels_->ns,
-                        data.prepared.data() + p * kernels_->np);
+      const std::size_t p =
+          static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+      kernels_->prepare(law_.get(), view(g, static_cast<int>(gi), e, step, data), local,
+                        s_old + p * kernels_->ns, data.prepared.data() + p * kernels_->np);
     });
   }
 }
@@ -173,7 +185,8 @@ double Term::energy(const StepInfo& step, const TermStepData& data, const Vector
     parallel_for(g.num_elements, [&](int e) {
       double local[3 * 80];
       gather_nodes(g, e, u.data(), 3, local);
-      const std::size_t p = static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+      const std::size_t p =
+          static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
       energies[e] = kernels_->energy(law_.get(), view(g, static_cast<int>(gi), e, step, data), local,
                                      data.prepared.data() + p * kernels_->np,
                                      gradient ? forces.data() + width * e : nullptr);
@@ -198,7 +211,8 @@ void Term::hessian(const StepInfo& step, const TermStepData& data, const VectorX
   ++counters_.hessian;
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
     const TermGroup& g = groups_[gi];
-    const std::size_t size = static_cast<std::size_t>(3 * g.num_nodes) * (3 * g.num_nodes), n8 = g.padded_nodes;
+    const std::size_t size = static_cast<std::size_t>(3 * g.num_nodes) * (3 * g.num_nodes),
+                      n8 = g.padded_nodes;
     const std::size_t work_size = 6 * n8 * n8 + 7 * kHessianRows * n8;
     constexpr int chunk = 16;  // elements computed in parallel before one thread adds them in order
     std::vector<double> dense(size * chunk), work(work_size * chunk);
@@ -209,10 +223,11 @@ void Term::hessian(const StepInfo& step, const TermStepData& data, const VectorX
         const int e = first + k;
         double local[3 * 80];
         gather_nodes(g, e, u.data(), 3, local);
-        const std::size_t p = static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+        const std::size_t p =
+            static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
         present[k] = kernels_->hessian(law_.get(), view(g, static_cast<int>(gi), e, step, data), local,
-                                       data.prepared.data() + p * kernels_->np, projected, work.data() + work_size * k,
-                                       dense.data() + size * k);
+                                       data.prepared.data() + p * kernels_->np, projected,
+                                       work.data() + work_size * k, dense.data() + size * k);
       });
       for (int k = 0; k < count; ++k)
         if (present[k]) sink.add(g, first + k, dense.data() + size * k);
@@ -228,7 +243,8 @@ void Term::update(const StepInfo& step, const TermStepData& data, const VectorXd
     parallel_for(g.num_elements, [&](int e) {
       double local[3 * 80];
       gather_nodes(g, e, u.data(), 3, local);
-      const std::size_t p = static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+      const std::size_t p =
+          static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
       kernels_->update(law_.get(), view(g, static_cast<int>(gi), e, step, data), local,
                        data.prepared.data() + p * kernels_->np, s_new + p * kernels_->ns);
     });
@@ -309,7 +325,8 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
       gather_nodes(g, e, u_old.data(), 3, lo);
       if (dir.du) gather_nodes(g, e, dir.du, 3 * D, du.data());
       if (dir.du_old) gather_nodes(g, e, dir.du_old, 3 * D, du_old.data());
-      const std::size_t p = static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+      const std::size_t p =
+          static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
       if (!dtheta.empty()) {
         dth.assign(static_cast<std::size_t>(g.num_points) * nt * D, 0.0);
         for (std::size_t k = 0; k < dtheta.size(); ++k) {
@@ -321,18 +338,19 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
                   values[per_point ? (static_cast<std::size_t>(e) * g.num_points + q) * nt + s : s];
         }
       }
-      kernels_->tangent(law_.get(), view(g, static_cast<int>(gi), e, step, data), lu, lo, s_old ? s_old + p * ns : nullptr,
-                        dir.du ? du.data() : nullptr, dir.du_old ? du_old.data() : nullptr,
-                        dir.ds_old ? dir.ds_old + p * ns * D : nullptr, dth.empty() ? nullptr : dth.data(),
-                        df ? forces.data() + width * e : nullptr, ds_new ? ds_new + p * ns * D : nullptr);
+      kernels_->tangent(law_.get(), view(g, static_cast<int>(gi), e, step, data), lu, lo,
+                        s_old ? s_old + p * ns : nullptr, dir.du ? du.data() : nullptr,
+                        dir.du_old ? du_old.data() : nullptr, dir.ds_old ? dir.ds_old + p * ns * D : nullptr,
+                        dth.empty() ? nullptr : dth.data(), df ? forces.data() + width * e : nullptr,
+                        ds_new ? ds_new + p * ns * D : nullptr);
     });
     if (df)
       for (int e = 0; e < g.num_elements; ++e) scatter_add(g, e, forces.data() + width * e, 3 * D, df);
   }
 }
 
-void Term::adjoint_update(const StepInfo& step, const TermStepData& data, const VectorXd& u, const double* s_bar,
-                          VectorXd& u_bar) const {
+void Term::adjoint_update(const StepInfo& step, const TermStepData& data, const VectorXd& u,
+                          const double* s_bar, VectorXd& u_bar) const {
   if (kernels_->ns == 0) return;
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
     const TermGroup& g = groups_[gi];
@@ -341,17 +359,19 @@ void Term::adjoint_update(const StepInfo& step, const TermStepData& data, const 
     parallel_for(g.num_elements, [&](int e) {
       double local[3 * 80];
       gather_nodes(g, e, u.data(), 3, local);
-      const std::size_t p = static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+      const std::size_t p =
+          static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
       kernels_->adjoint_update(law_.get(), view(g, static_cast<int>(gi), e, step, data), local,
-                               data.prepared.data() + p * kernels_->np, s_bar + p * kernels_->ns, bars.data() + width * e);
+                               data.prepared.data() + p * kernels_->np, s_bar + p * kernels_->ns,
+                               bars.data() + width * e);
     });
     for (int e = 0; e < g.num_elements; ++e) scatter_add(g, e, bars.data() + width * e, 3, u_bar.data());
   }
 }
 
-void Term::adjoint_step(const StepInfo& step, const TermStepData& data, const VectorXd& u, const VectorXd& u_old,
-                        const double* s_old, const VectorXd& adj, const double* s_bar, VectorXd& u_old_bar,
-                        double* s_old_bar, VectorXd& native_bar) const {
+void Term::adjoint_step(const StepInfo& step, const TermStepData& data, const VectorXd& u,
+                        const VectorXd& u_old, const double* s_old, const VectorXd& adj, const double* s_bar,
+                        VectorXd& u_old_bar, double* s_old_bar, VectorXd& native_bar) const {
   const int nt = kernels_->ntheta, ns = kernels_->ns;
   std::vector<double> theta_bar(static_cast<std::size_t>(num_points_) * nt, 0.0);
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
@@ -363,14 +383,16 @@ void Term::adjoint_step(const StepInfo& step, const TermStepData& data, const Ve
       gather_nodes(g, e, u.data(), 3, lu);
       gather_nodes(g, e, u_old.data(), 3, lo);
       gather_nodes(g, e, adj.data(), 3, la);
-      const std::size_t p = static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+      const std::size_t p =
+          static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
       kernels_->adjoint_step(law_.get(), view(g, static_cast<int>(gi), e, step, data), lu, lo,
                              s_old ? s_old + p * ns : nullptr, data.prepared.data() + p * kernels_->np, la,
                              s_bar ? s_bar + p * ns : nullptr, bars.data() + width * e,
                              s_old_bar ? s_old_bar + p * ns : nullptr, theta_bar.data() + p * nt);
     });
     if (kernels_->np > 0)
-      for (int e = 0; e < g.num_elements; ++e) scatter_add(g, e, bars.data() + width * e, 3, u_old_bar.data());
+      for (int e = 0; e < g.num_elements; ++e)
+        scatter_add(g, e, bars.data() + width * e, 3, u_old_bar.data());
   }
   add_theta_transpose(step, theta_bar, native_bar);
 }

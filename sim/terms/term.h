@@ -1,11 +1,12 @@
 // An energy term: a law at quadrature points, where those points are, and where its parameters come from.
 //
-// A term is const while a step is solved. Everything it carries from step to step is its slice of State::history; what
-// a step needs of the old state is prepared once per step (StepData). Tangent and adjoint blocks come from the generic
-// kernels, so a new term is a law (one header) and a builder.
+// A term is const while a step is solved. Everything it carries from step to step is its slice of
+// State::history; what a step needs of the old state is prepared once per step (StepData). Tangent and
+// adjoint blocks come from the generic kernels, so a new term is a law (one header) and a builder.
 //
-// Parameters reach the points by a linear map of the model's native parameter vector: a constant slot, a field over
-// the columns (ligament b), or a position on a collider's path. The map and its transpose are the only way in and out.
+// Parameters reach the points by a linear map of the model's native parameter vector: a constant slot, a
+// field over the columns (ligament b), or a position on a collider's path. The map and its transpose are the
+// only way in and out.
 #pragma once
 
 #include <memory>
@@ -31,32 +32,33 @@ struct StepInfo {
 struct ThetaSlot {
   enum class Kind { constant, field, path_now, path_old };
   Kind kind = Kind::constant;
-  int offset = 0;                     ///< of the constant, of column 0, or of the first knot's coordinate
-  std::vector<double> knot_times;     ///< path: s; knot k's coordinate is native[offset + 3k]
+  int offset = 0;                  ///< of the constant, of column 0, or of the first knot's coordinate
+  std::vector<double> knot_times;  ///< path: s; knot k's coordinate is native[offset + 3k]
 };
 
-/// Elements of one shape and one parameter set; the arrays' shapes are those of ElementView with a leading element index.
+/// Elements of one shape and one parameter set; the arrays' shapes are those of ElementView with a leading
+/// element index.
 struct TermGroup {
   int num_elements = 0, num_nodes = 0, num_points = 0;
   int padded_nodes = 0, padded_rows = 0;
-  std::vector<int> nodes;                  ///< [num_elements][num_nodes] mesh nodes
-  std::vector<double> node_by_row;         ///< [num_points·R][padded_nodes]
-  std::vector<double> rows_by_node;        ///< [num_nodes][padded_rows]
-  std::vector<double> inverse_jacobian;    ///< [num_elements][num_points][9], prisms only
-  std::vector<double> weight;              ///< [num_elements][num_points]
-  std::vector<double> rest;                ///< [num_elements][num_points][nrest]
-  std::vector<ThetaSlot> theta;            ///< one per law parameter
-  std::vector<int> field_columns;          ///< [num_elements][num_points][3], when a slot is a field
-  std::vector<double> field_weights;       ///< same shape, rows sum to 1
-  std::vector<int> cliques;                ///< [num_elements] index in the model's BlockPattern
-  int first_point = 0;                     ///< of this group within the term
-  int material = -1;                       ///< layer index for skin, −1 otherwise
+  std::vector<int> nodes;                ///< [num_elements][num_nodes] mesh nodes
+  std::vector<double> node_by_row;       ///< [num_points·R][padded_nodes]
+  std::vector<double> rows_by_node;      ///< [num_nodes][padded_rows]
+  std::vector<double> inverse_jacobian;  ///< [num_elements][num_points][9], prisms only
+  std::vector<double> weight;            ///< [num_elements][num_points]
+  std::vector<double> rest;              ///< [num_elements][num_points][nrest]
+  std::vector<ThetaSlot> theta;          ///< one per law parameter
+  std::vector<int> field_columns;        ///< [num_elements][num_points][3], when a slot is a field
+  std::vector<double> field_weights;     ///< same shape, rows sum to 1
+  std::vector<int> cliques;              ///< [num_elements] index in the model's BlockPattern
+  int first_point = 0;                   ///< of this group within the term
+  int material = -1;                     ///< layer index for skin, −1 otherwise
 };
 
 /// What a step needs of the old state, per term: prepared old-state data and the parameters at the points.
 struct TermStepData {
-  std::vector<double> prepared;             ///< [num_points][np]
-  std::vector<std::vector<double>> theta;   ///< per group: one row, or [num_elements·num_points][ntheta]
+  std::vector<double> prepared;            ///< [num_points][np]
+  std::vector<std::vector<double>> theta;  ///< per group: one row, or [num_elements·num_points][ntheta]
 };
 
 /// Counts of work actually done; a scene without a feature must leave its counters at zero (tested).
@@ -66,7 +68,8 @@ struct TermCounters {
 
 class Term {
  public:
-  /// `law` is plain data that matches the kernels and is kept for the life of the term; name as the user knows it.
+  /// `law` is plain data that matches the kernels and is kept for the life of the term; name as the user
+  /// knows it.
   template <class Law>
   Term(std::string name, const KernelTable& kernels, const Law& law)
       : name_(std::move(name)), kernels_(&kernels), law_(std::make_shared<Law>(law)) {}
@@ -89,12 +92,14 @@ class Term {
   /// Parameters at the points from a native vector, or from a direction in it (the map is linear).
   std::vector<std::vector<double>> load_theta(const StepInfo& step, const VectorXd& native) const;
   /// Transpose of load_theta: adds theta_bar [num_points][ntheta] to native_bar.
-  void add_theta_transpose(const StepInfo& step, const std::vector<double>& theta_bar, VectorXd& native_bar) const;
+  void add_theta_transpose(const StepInfo& step, const std::vector<double>& theta_bar,
+                           VectorXd& native_bar) const;
 
   /// Prepares a step. u is [num_nodes·3]; history is this term's slice.
   void prepare(const StepInfo& step, const VectorXd& native, const VectorXd& u_old, const double* s_old,
                TermStepData& data) const;
-  /// Energy [mJ]; adds to gradient [num_nodes·3] and to |forces| (same shape) unless null. +inf outside the domain.
+  /// Energy [mJ]; adds to gradient [num_nodes·3] and to |forces| (same shape) unless null. +inf outside the
+  /// domain.
   double energy(const StepInfo& step, const TermStepData& data, const VectorXd& u, VectorXd* gradient,
                 VectorXd* absolute) const;
   /// Where assembled element matrices go.
@@ -104,7 +109,8 @@ class Term {
     /// dense is [3n][3n], node-major; called in a fixed order from one thread.
     virtual void add(const TermGroup& group, int element, double* dense) = 0;
   };
-  void hessian(const StepInfo& step, const TermStepData& data, const VectorXd& u, bool projected, MatrixSink& sink) const;
+  void hessian(const StepInfo& step, const TermStepData& data, const VectorXd& u, bool projected,
+               MatrixSink& sink) const;
   /// New history slice.
   void update(const StepInfo& step, const TermStepData& data, const VectorXd& u, double* s_new) const;
   /// Largest s ≤ 1 with det(F + s dF) > 0 everywhere; +inf when the whole step is free.
@@ -112,8 +118,9 @@ class Term {
   /// Smallest J = det F over the points (prisms; +inf for surface terms).
   double smallest_jacobian(const VectorXd& u) const;
 
-  /// Tangent blocks along `count` ≤ kDirections directions; see PointKernel::tangent. Direction-major columns:
-  /// du, du_old, df [num_nodes·3][kDirections], ds_old, ds_new [history][kDirections] row-major, dnative one per direction.
+  /// Tangent blocks along `count` ≤ kDirections directions; see PointKernel::tangent. Direction-major
+  /// columns: du, du_old, df [num_nodes·3][kDirections], ds_old, ds_new [history][kDirections] row-major,
+  /// dnative one per direction.
   struct Directions {
     int count = 0;
     const double* du = nullptr;
@@ -145,7 +152,8 @@ class Term {
   mutable TermCounters counters_;
 };
 
-/// Value and knot weights of a piecewise linear path at time t: up to two (knot, weight) pairs, constant outside.
+/// Value and knot weights of a piecewise linear path at time t: up to two (knot, weight) pairs, constant
+/// outside.
 struct PathWeights {
   int knot[2];
   double weight[2];

@@ -29,7 +29,8 @@ void Model::finish() {
     }
   }
   // Faces whose nodes are all fixed give all −1 cliques; several of them share one key, which is harmless.
-  pattern_ = std::make_shared<BlockPattern>(static_cast<int>(constraints.block_nodes.size()), std::move(cliques));
+  pattern_ =
+      std::make_shared<BlockPattern>(static_cast<int>(constraints.block_nodes.size()), std::move(cliques));
 }
 
 State Model::rest_state() const {
@@ -71,8 +72,12 @@ MatrixXd Model::to_displacement(const MatrixXd& q) const {
   return u;
 }
 
-VectorXd Model::to_unknowns(const VectorXd& u) const { return to_unknowns(MatrixXd(u)).col(0); }
-VectorXd Model::to_displacement(const VectorXd& q) const { return to_displacement(MatrixXd(q)).col(0); }
+VectorXd Model::to_unknowns(const VectorXd& u) const {
+  return to_unknowns(MatrixXd(u)).col(0);
+}
+VectorXd Model::to_displacement(const VectorXd& q) const {
+  return to_displacement(MatrixXd(q)).col(0);
+}
 
 StepProblem::StepProblem(const Model& model, const VectorXd& native, const StepInfo& step, const State& old)
     : model_(&model), native_(&native), step_(step), old_(&old), data_(model.terms.size()) {
@@ -87,7 +92,8 @@ double StepProblem::energy(const VectorXd& q, VectorXd* gradient) {
   if (gradient) g = absolute = VectorXd::Zero(u.size());
   double total = 0;
   for (std::size_t k = 0; k < data_.size(); ++k) {
-    total += model_->terms[k].energy(step_, data_[k], u, gradient ? &g : nullptr, gradient ? &absolute : nullptr);
+    total +=
+        model_->terms[k].energy(step_, data_[k], u, gradient ? &g : nullptr, gradient ? &absolute : nullptr);
     if (!std::isfinite(total)) return std::numeric_limits<double>::infinity();
   }
   if (gradient) {
@@ -99,7 +105,8 @@ double StepProblem::energy(const VectorXd& q, VectorXd* gradient) {
 
 VectorXd StepProblem::residual(const VectorXd& u) const {
   VectorXd g = VectorXd::Zero(u.size());
-  for (std::size_t k = 0; k < data_.size(); ++k) (void)model_->terms[k].energy(step_, data_[k], u, &g, nullptr);
+  for (std::size_t k = 0; k < data_.size(); ++k)
+    (void)model_->terms[k].energy(step_, data_[k], u, &g, nullptr);
   return g;
 }
 

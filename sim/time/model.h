@@ -1,8 +1,8 @@
 // A scene made ready to run: prism mesh, the energy terms the scene needs (and no others), native parameters,
 // constraints and sparsity.
 //
-// Residual convention: R = +∂W/∂u; the internal force is −R. Unknowns q: per free node its three components in the
-// node's own frame (identity but for sliding rims), so that every constraint fixes single components.
+// Residual convention: R = +∂W/∂u; the internal force is −R. Unknowns q: per free node its three components
+// in the node's own frame (identity but for sliding rims), so that every constraint fixes single components.
 #pragma once
 
 #include <memory>
@@ -19,7 +19,7 @@ namespace rhytid {
 
 /// A named run of native parameters.
 struct NativeBlock {
-  std::string name;     ///< e.g. "layer/film", "ligaments/b", "collider/finger/path"
+  std::string name;  ///< e.g. "layer/film", "ligaments/b", "collider/finger/path"
   int offset = 0, size = 0;
   /// Entries that scale all energies when multiplied together (moduli, k, κ): the gauge direction.
   std::vector<int> stiffness_like;  ///< indices into the native vector
@@ -54,7 +54,8 @@ class Model {
   State rest_state() const;
   const NativeBlock& native_block(const std::string& name) const;  ///< throws ContractError when absent
 
-  /// Unknowns from displacements and back (a gradient maps like a displacement; fixed components read as zero).
+  /// Unknowns from displacements and back (a gradient maps like a displacement; fixed components read as
+  /// zero).
   VectorXd to_unknowns(const VectorXd& u) const;
   VectorXd to_displacement(const VectorXd& q) const;
   /// Same for k columns at once, [num_nodes·3][k] → [num_unknowns][k].
@@ -67,8 +68,8 @@ class Model {
   std::vector<std::size_t> history_offsets_;
 };
 
-/// One step's problem: energies of all terms with the old state prepared. The model, native vector and old state must
-/// outlive it.
+/// One step's problem: energies of all terms with the old state prepared. The model, native vector and old
+/// state must outlive it.
 class StepProblem final : public Objective {
  public:
   StepProblem(const Model& model, const VectorXd& native, const StepInfo& step, const State& old);

@@ -16,8 +16,8 @@ void RunOptions::validate() const {
   minimiser.validate();
 }
 
-Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions& options, const RunObserver& observer,
-                    const State* initial) {
+Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions& options,
+                    const RunObserver& observer, const State* initial) {
   options.validate();
   const auto start = std::chrono::steady_clock::now();
   Trajectory run;
@@ -42,7 +42,9 @@ Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions
         VectorXd q = model.to_unknowns(current.u);
         IterationCallback callback;
         if (observer.iteration)
-          callback = [&, t = target](int it, double e, double r) { return observer.iteration(frame, t, it, e, r); };
+          callback = [&, t = target](int it, double e, double r) {
+            return observer.iteration(frame, t, it, e, r);
+          };
         MinimiserReport report = minimise(problem, q, options.minimiser, factor, matrix, callback);
         if (!report.converged()) {
           if (report.status != MinimiserStatus::interrupted && depth < options.max_bisections) {
@@ -51,8 +53,11 @@ Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions
             continue;
           }
           char text[256];
-          std::snprintf(text, sizeof text, "frame %d, t = %.6g s: %s after %d iterations and %d bisections (residual %.3g N, wanted %.3g N)",
-                        frame, target, name(report.status), report.iterations, depth, report.residual, report.tolerance);
+          std::snprintf(text, sizeof text,
+                        "frame %d, t = %.6g s: %s after %d iterations and %d bisections (residual %.3g N, "
+                        "wanted %.3g N)",
+                        frame, target, name(report.status), report.iterations, depth, report.residual,
+                        report.tolerance);
           run.failure = text;
           run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
           return run;

@@ -1,4 +1,5 @@
-// Quasi-static runs: one implicit step per frame (or substep), bisected when it does not converge, never silently.
+// Quasi-static runs: one implicit step per frame (or substep), bisected when it does not converge, never
+// silently.
 #pragma once
 
 #include <functional>
@@ -10,10 +11,10 @@
 namespace rhytid {
 
 struct RunOptions {
-  double frame_rate = 24;   ///< frames per second
-  int frames = 0;           ///< frames after the rest frame
-  int substeps = 1;         ///< steps per frame
-  int max_bisections = 4;   ///< a step that fails is halved at most this often
+  double frame_rate = 24;  ///< frames per second
+  int frames = 0;          ///< frames after the rest frame
+  int substeps = 1;        ///< steps per frame
+  int max_bisections = 4;  ///< a step that fails is halved at most this often
   MinimiserOptions minimiser;
   bool keep_states = true;  ///< keep every step's state in the trajectory (needed for gradients)
   void validate() const;    ///< throws ContractError naming the field
@@ -22,19 +23,20 @@ struct RunOptions {
 /// One converged step.
 struct StepRecord {
   StepInfo step;
-  int frame = 0;            ///< frame the step leads to (1-based; frame 0 is rest)
-  int bisections = 0;       ///< how often the nominal step was halved
-  State state;              ///< after the step (empty when states are not kept)
+  int frame = 0;       ///< frame the step leads to (1-based; frame 0 is rest)
+  int bisections = 0;  ///< how often the nominal step was halved
+  State state;         ///< after the step (empty when states are not kept)
   MinimiserReport report;
 };
 
 struct Trajectory {
   State initial;
   std::vector<StepRecord> steps;
-  std::vector<int> frame_end;   ///< [frames reached + 1] number of steps done at the end of each frame; [0] = 0
-  bool complete = false;        ///< every frame was reached
-  std::string failure;          ///< one sentence when not complete
-  double seconds = 0;           ///< wall time
+  std::vector<int>
+      frame_end;          ///< [frames reached + 1] number of steps done at the end of each frame; [0] = 0
+  bool complete = false;  ///< every frame was reached
+  std::string failure;    ///< one sentence when not complete
+  double seconds = 0;     ///< wall time
 
   int frames() const { return static_cast<int>(frame_end.size()) - 1; }
   /// State before step i and at the end of frame f (states kept).
@@ -51,8 +53,9 @@ struct StepEvent {
 };
 
 struct RunObserver {
-  std::function<void(const StepEvent&)> step;                        ///< after every converged step
-  std::function<bool(int frame, double t, int iteration, double energy, double residual)> iteration;  ///< false = stop
+  std::function<void(const StepEvent&)> step;  ///< after every converged step
+  std::function<bool(int frame, double t, int iteration, double energy, double residual)>
+      iteration;  ///< false = stop
 };
 
 /// Runs from `initial` (rest when null). Step times are fixed by frame rate and substeps, plus bisections.

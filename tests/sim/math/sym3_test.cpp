@@ -55,7 +55,8 @@ TEST(Sym3, LogAndPowerValues) {
     }
 }
 
-/// Derivatives against central differences in long double, extrapolated; also at exactly repeated eigenvalues.
+/// Derivatives against central differences in long double, extrapolated; also at exactly repeated
+/// eigenvalues.
 TEST(Sym3, DualDerivatives) {
   std::mt19937 rng(2);
   for (double gap : {0.3, 1e-5, 1e-13, 0.0}) {
@@ -87,7 +88,8 @@ TEST(Sym3, DualDerivatives) {
       const LongMat3 ref = (4 * difference(5e-5L, power) - difference(1e-4L, power)) / 3;
       const Dual<1>* d = power ? pow_d : log_d;
       for (int c = 0; c < 6; ++c)
-        EXPECT_NEAR(d[c].d[0], double(ref(kSymRow[c], kSymCol[c])), 2e-13) << "gap " << gap << " power " << power;
+        EXPECT_NEAR(d[c].d[0], double(ref(kSymRow[c], kSymCol[c])), 2e-13)
+            << "gap " << gap << " power " << power;
     }
   }
 }

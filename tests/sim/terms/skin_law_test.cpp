@@ -18,7 +18,9 @@ constexpr DamperScheme kSchemes[] = {DamperScheme::exponential, DamperScheme::li
 struct Moduli {
   double mu, bulk;
 };
-Moduli moduli(double e, double nu) { return {e / (2 * (1 + nu)), e / (3 * (1 - 2 * nu))}; }
+Moduli moduli(double e, double nu) {
+  return {e / (2 * (1 + nu)), e / (3 * (1 - 2 * nu))};
+}
 
 Mat3 random_f(std::mt19937& rng, double amount) {
   std::uniform_real_distribution<double> d(-amount, amount);
@@ -187,7 +189,8 @@ TEST(SkinLaw, DamperOrder) {
 }
 
 TEST(SkinLaw, MaxwellRampAgainstExact) {
-  // Coaxial ramp of 0.02 log strain per step at dt/tau = 0.5 (isochoric uniaxial): elastic log strain after 12 steps.
+  // Coaxial ramp of 0.02 log strain per step at dt/tau = 0.5 (isochoric uniaxial): elastic log strain after
+  // 12 steps.
   const double tau = 2, dt = 1;
   const double theta[5] = {0, 1, 1e-9, 1, tau};
   const auto elastic_strain = [&](DamperScheme scheme) {
