@@ -1,0 +1,73 @@
+// What is differentiated: quantities read off the state at the end of a frame.
+//
+// To add one: derive from Output, give values, tangent and adjoint of one frame (they must pair: tests/adjoint checks
+// <J v, w> = <v, Jᵀ w> for every output), and pass it to the sweeps. Nothing else needs to know.
+#pragma once
+
+#include <vector>
+
+#include "sim/time/model.h"
+
+namespace rhytid::adjoint {
+
+/// A vector-valued function of the state at the end of a frame (0 = rest). Immutable while a sweep runs.
+class Output {
+ public:
+  virtual ~Output() = default;
+  /// Number of values in this frame; 0 when the output does not look at it.
+  virtual int size(int frame) const = 0;
+  /// Values at the state, [size(frame)].
+  virtual VectorXd values(int frame, const State& state) const = 0;
+  /// Derivative along k directions: du [num_nodes·3][k], ds [history][k] → [size(frame)][k].
+  virtual MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const = 0;
+  /// Adds the transposed derivative applied to weights [size(frame)] to u_bar and s_bar.
+  virtual void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar, VectorXd& s_bar) const = 0;
+};
+
+/// A point fixed to the skin: a place on the inner or outer surface in natural coordinates of a face.
+struct MaterialPoint {
+  int face = 0;
+  double u = 0, v = 0;  ///< natural coordinates on the face
+  bool outer = true;
+};
+
+/// Interpolation of nodal values at material points: positions are linear in the displacement.
+class PointInterpolation {
+ public:
+  PointInterpolation(const SkinMesh& mesh, std::vector<MaterialPoint> points);
+  int num_points() const { return static_cast<int>(points_.size()); }
+  const std::vector<MaterialPoint>& points() const { return points_; }
+  Vec3 rest(int point) const { return rest_.row(point).transpose(); }
+  Vec3 displacement(int point, const VectorXd& u) const;
+  /// Position = rest + displacement, mm.
+  Vec3 position(int point, const VectorXd& u) const { return rest(point) + displacement(point, u); }
+  /// d displacement along directions du [num_nodes·3][k] → [3][k].
+  MatrixXd tangent(int point, const MatrixXd& du) const;
+  /// Adds the transpose: u_bar += Nᵀ weight.
+  void adjoint(int point, const Vec3& weight, VectorXd& u_bar) const;
+
+ private:
+  std::vector<MaterialPoint> points_;
+  int num_nodes_;
+  std::vector<int> nodes_;        ///< [points][num_nodes_]
+  std::vector<double> weights_;   ///< same shape
+  MatrixX3 rest_;
+};
+
+/// Positions [3·points] of material points at every frame from `first_frame` on.
+class PointPositions final : public Output {
+ public:
+  PointPositions(const SkinMesh& mesh, std::vector<MaterialPoint> points, int first_frame = 1)
+      : interpolation_(mesh, std::move(points)), first_frame_(first_frame) {}
+  int size(int frame) const override { return frame >= first_frame_ ? 3 * interpolation_.num_points() : 0; }
+  VectorXd values(int frame, const State& state) const override;
+  MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const override;
+  void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar, VectorXd& s_bar) const override;
+  const PointInterpolation& interpolation() const { return interpolation_; }
+
+ private:
+  PointInterpolation interpolation_;
+  int first_frame_;
+};
+
+}  // namespace rhytid::adjoint
