@@ -13,11 +13,6 @@
 namespace rhytid::tools {
 namespace {
 
-struct RawOptions {
-  CommonOptions common;
-  std::vector<std::string> settings;
-};
-
 std::string version_text(const Program& program) {
   const BuildInfo info = build_info();
   return program.name + " " + info.version + " (" + info.build_type + ", " + info.compiler +
@@ -33,24 +28,24 @@ std::string footer(const VerbHelp& help) {
          "Exit     0 ok, 2 bad input, 3 did not converge or a check failed, 4 interrupted, 1 anything else";
 }
 
-void add_verb(CLI::App& app, Verb& verb, RawOptions& raw) {
+void add_verb(CLI::App& app, Verb& verb, CommonOptions& options) {
   const VerbHelp help = verb.help();
   // The list of verbs shows the summary, the verb's own --help the paragraph: CLI11 has one text for both.
   CLI::App* sub = app.add_subcommand(help.name, help.summary);
   sub->footer(footer(help));
   if (verb.takes_file()) {
-    sub->add_option("file", raw.common.file, "scene.json or case.json")->required()->option_text("FILE");
-    sub->add_option("-o,--output", raw.common.output, "folder for results (default run/<name of the scene>)")
+    sub->add_option("file", options.file, "scene.json or case.json")->required()->option_text("FILE");
+    sub->add_option("-o,--output", options.output, "folder for results (default run/<name of the scene>)")
         ->option_text("DIR");
-    sub->add_option("--set", raw.settings,
+    sub->add_option("--set", options.settings,
                     "change one value of the file, as --set /time/frames=12; repeatable")
         ->option_text("/POINTER=VALUE")
         ->allow_extra_args(false);
   }
-  sub->add_option("--threads", raw.common.threads, "number of threads (default: all cores)")
+  sub->add_option("--threads", options.threads, "number of threads (default: all cores)")
       ->option_text("N")
       ->check(CLI::Range(1, max_threads));
-  sub->add_flag("--log-json", raw.common.log_json, "progress as one JSON object per line on stderr");
+  sub->add_flag("--log-json", options.log_json, "progress as one JSON object per line on stderr");
   verb.add_options(*sub);
 }
 
@@ -82,9 +77,9 @@ ExitCode parse_and_run(const Program& program, int argc, const char* const* argv
   app.require_subcommand(1);
   app.footer("Units are mm, N, MPa and s. Run '" + program.name +
              " VERB --help' for what a verb reads and writes.");
-  RawOptions raw;
-  raw.common.threads = available_threads();
-  for (const auto& verb : program.verbs) add_verb(app, *verb, raw);
+  CommonOptions options;
+  options.threads = available_threads();
+  for (const auto& verb : program.verbs) add_verb(app, *verb, options);
 
   // A verb's --help shows its paragraph instead of the summary.
   if (argc > 2) {
@@ -102,8 +97,7 @@ ExitCode parse_and_run(const Program& program, int argc, const char* const* argv
     throw InputError(std::string(error.what()) + " (see " + program.name + " " + argv[1] + " --help)");
   }
 
-  CommonOptions& options = raw.common;
-  for (const std::string& text : raw.settings) options.settings.push_back(parse_setting(text));
+  for (const std::string& text : options.settings) check_setting(text);
   if (options.output.empty()) options.output = default_output(options.file);
   use_threads(options.threads);
 
@@ -120,12 +114,10 @@ ExitCode parse_and_run(const Program& program, int argc, const char* const* argv
 
 }  // namespace
 
-Setting parse_setting(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (text.empty() || text[0] != '/' || equals == std::string::npos) {
+void check_setting(const std::string& text) {
+  if (text.empty() || text[0] != '/' || text.find('=') == std::string::npos) {
     throw InputError("--set", "'" + text + "'", "/json/pointer=value");
   }
-  return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
 std::string default_output(const std::string& file) {

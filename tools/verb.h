@@ -17,21 +17,15 @@ class App;
 
 namespace rhytid::tools {
 
-/// One --set /json/pointer=value. The value is JSON text, or a plain string when it does not parse as JSON.
-struct Setting {
-  std::string pointer, value;
-};
-
-/// "/skin/order=4" -> {"/skin/order", "4"}. Throws InputError unless there is a pointer (starting with '/')
-/// and '='.
-Setting parse_setting(const std::string& text);
+/// Throws InputError unless `text` reads /json/pointer=value, as --set wants it.
+void check_setting(const std::string& text);
 
 /// The options that all verbs share.
 struct CommonOptions {
-  std::string file;               ///< scene.json or case.json as typed; empty when the verb takes none
-  std::string output;             ///< folder for results; given by -o, else run/<name of the scene>
-  std::vector<Setting> settings;  ///< in the order given
-  int threads = 1;                ///< already applied to OpenMP and BLAS
+  std::string file;                   ///< scene.json or case.json as typed; empty when the verb takes none
+  std::string output;                 ///< folder for results; given by -o, else run/<name of the scene>
+  std::vector<std::string> settings;  ///< "/json/pointer=value" in the order given, as load_scene takes them
+  int threads = 1;                    ///< already applied to OpenMP and BLAS
   bool log_json = false;
 };
 
