@@ -25,6 +25,8 @@ expect() {
 expect 0 0 '^rhytid.* [0-9]+\.[0-9]+\.[0-9]+ ' --version
 expect 0 0 'doctor' --help
 expect 0 0 '^Example' doctor --help
+expect 0 0 '"\$schema"' schema
+expect 0 0 '^#' schema --docs
 expect 2 1 '^rhytid: error: verb: got nothing'
 expect 2 1 "^rhytid: error: verb: got 'no-such-verb', expected one of .*doctor" no-such-verb
 expect 2 1 '^rhytid: error: .*--no-such-option' doctor --no-such-option
