@@ -175,7 +175,7 @@ std::string default_text(const Rule& rule) {
 
 constexpr const char* introduction = R"(# The scene file
 
-<!-- Generated from the rules table by `rhytid schema --markdown`; edit the table instead. -->
+<!-- Generated from the rules table by `rhytid schema --docs`; edit the table instead. -->
 
 JSON with `//` and `/* */` comments. Plain numbers are in mm, N, MPa, s and what follows from them; a string with
 a unit is converted: `"20 kPa"`, `"0.8 1/mm"`, `"20 mm^2"`, `"24 Hz"`, `"30 deg"`, `"80 %"`. A wrong dimension, an

@@ -23,7 +23,7 @@ def check(files):
 class CheckSources(unittest.TestCase):
     good = {"sim/a.h": HEADER, "adjoint/b.h": HEADER + '#include "sim/a.h"\n',
             "fitting/c.cpp": '#include <ceres/ceres.h>\n#include "adjoint/b.h"\n',
-            "tests/t.cpp": '#include "adjoint/b.h"\n'}
+            "tests/t.cpp": '#include "adjoint/b.h"\n#include "support.h"\n', "tests/support.h": HEADER}
 
     def test_good_tree(self):
         self.assertEqual(check(self.good)[0], 0)
