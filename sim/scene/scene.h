@@ -12,117 +12,120 @@
 
 namespace rhytid {
 
-
 enum class RimCondition { clamped, sliding, free };
 enum class ThicknessScheme { stacked, composite };
 enum class ShapeKind { sphere, plane, imls };
 
 struct LayerScene {
   std::string name;
-  double thickness = 0;             ///< mm
-  int elements = 1;                 ///< element layers (stacked)
-  int order = 2;                    ///< q (stacked)
-  double youngs_modulus = 0;        ///< MPa, instantaneous: mu = E / 2(1+nu), K = E / 3(1−2nu)
+  double thickness = 0;       ///< mm
+  int elements = 1;           ///< element layers (stacked)
+  int order = 2;              ///< q (stacked)
+  double youngs_modulus = 0;  ///< MPa, instantaneous: mu = E / 2(1+nu), K = E / 3(1−2nu)
   double poissons_ratio = 0.49;
-  double stiffening = 1;            ///< C of the Fung term
-  double relaxing_fraction = 0.8;   ///< mu_m / mu; mu_inf = (1 − fraction) mu
-  double relaxation_time = 1. / 12; ///< tau, s
+  double stiffening = 1;             ///< C of the Fung term
+  double relaxing_fraction = 0.8;    ///< mu_m / mu; mu_inf = (1 − fraction) mu
+  double relaxation_time = 1. / 12;  ///< tau, s
 };
 
 struct SurfaceScene {
   // Exactly one of file or grid.
-  std::string file;                      ///< resolved path, empty when a grid
+  std::string file;  ///< resolved path, empty when a grid
   double mm_per_unit = 1;
-  std::optional<Vec3> crop_centre;       ///< mm
-  double crop_radius = 0;                ///< mm, geodesic
-  bool is_outer = true;                  ///< the surface is the outer skin (else the inner face)
-  std::array<double, 2> grid_size{0, 0}; ///< mm
+  std::optional<Vec3> crop_centre;        ///< mm
+  double crop_radius = 0;                 ///< mm, geodesic
+  bool is_outer = true;                   ///< the surface is the outer skin (else the inner face)
+  std::array<double, 2> grid_size{0, 0};  ///< mm
   std::array<int, 2> grid_cells{0, 0};
   std::string grid_pattern = "union_jack";
-  double bend_radius = 0;                ///< mm, 0 = flat
+  double bend_radius = 0;  ///< mm, 0 = flat
   int normal_smoothing = 2;
 };
 
 struct SourceScene {
   std::string name;
-  Vec3 position = Vec3::Zero();     ///< mm, projected to the inner surface
-  std::optional<int> vertex;        ///< vertex of the input surface instead of a position
-  double strength = 1;              ///< b_s, 1/mm
-  double radius = 5;                ///< mm
+  Vec3 position = Vec3::Zero();  ///< mm, projected to the inner surface
+  std::optional<int> vertex;     ///< vertex of the input surface instead of a position
+  double strength = 1;           ///< b_s, 1/mm
+  double radius = 5;             ///< mm
 };
 
 struct LigamentScene {
-  double stiffness = 5e-4;          ///< k, MPa
-  double smoothing = 0;             ///< eps, mm (0 = 1e-2 of the skin thickness)
-  double diffusion_time = 20;       ///< t, mm²
+  double stiffness = 5e-4;     ///< k, MPa
+  double smoothing = 0;        ///< eps, mm (0 = 1e-2 of the skin thickness)
+  double diffusion_time = 20;  ///< t, mm²
   std::vector<SourceScene> sources;
 };
 
 struct FrictionScene {
   double coefficient = 0.8;
-  double slip_speed = 1;            ///< eps_v, mm/s
-  std::string mollifier = "quintic";///< quintic (publication) | quadratic (IPC)
+  double slip_speed = 1;              ///< eps_v, mm/s
+  std::string mollifier = "quintic";  ///< quintic (publication) | quadratic (IPC)
 };
 
 struct BaseScene {
-  ShapeKind shape = ShapeKind::plane;   ///< plane | sphere | imls, built from the rest inner surface unless given
-  double stiffness = 1;                 ///< kappa, MPa/mm
-  double onset = 1e-3;                  ///< eps_g, mm (0 = C¹ literal penalty)
-  Vec3 centre = Vec3::Zero();           ///< sphere centre or a plane point, mm
-  double radius = 0;                    ///< sphere, mm
-  Vec3 normal = Vec3::UnitZ();          ///< plane
-  double imls_support = 0;              ///< h, mm (0 = 3 × median node spacing)
+  ShapeKind shape =
+      ShapeKind::plane;         ///< plane | sphere | imls, built from the rest inner surface unless given
+  double stiffness = 1;         ///< kappa, MPa/mm
+  double onset = 1e-3;          ///< eps_g, mm (0 = C¹ literal penalty)
+  Vec3 centre = Vec3::Zero();   ///< sphere centre or a plane point, mm
+  double radius = 0;            ///< sphere, mm
+  Vec3 normal = Vec3::UnitZ();  ///< plane
+  double imls_support = 0;      ///< h, mm (0 = 3 × median node spacing)
 };
 
-struct PathKnot { double time; Vec3 position; };   ///< s, mm; linear between knots, constant outside
+struct PathKnot {
+  double time;
+  Vec3 position;
+};  ///< s, mm; linear between knots, constant outside
 
 struct ColliderScene {
   std::string name;
   ShapeKind shape = ShapeKind::sphere;
-  double radius = 8;                    ///< mm
-  Vec3 normal = Vec3::UnitZ();          ///< plane: outward normal
-  double stiffness = 1;                 ///< kappa, MPa/mm
-  double onset = 1e-3;                  ///< eps_g, mm
+  double radius = 8;            ///< mm
+  Vec3 normal = Vec3::UnitZ();  ///< plane: outward normal
+  double stiffness = 1;         ///< kappa, MPa/mm
+  double onset = 1e-3;          ///< eps_g, mm
   std::optional<FrictionScene> friction;
   std::vector<PathKnot> path;
 };
 
 struct TimeScene {
-  double frame_rate = 24;               ///< 1/s
-  int frames = 0;                       ///< frames after the rest frame 0
-  int substeps = 1;                     ///< per frame
+  double frame_rate = 24;  ///< 1/s
+  int frames = 0;          ///< frames after the rest frame 0
+  int substeps = 1;        ///< per frame
   int max_bisections = 4;
   DamperScheme damper = DamperScheme::exponential;
 };
 
 struct SolverScene {
-  std::string minimiser = "newton";     ///< newton | newton_projected | lbfgs
+  std::string minimiser = "newton";  ///< newton | newton_projected | lbfgs
   double relative_tolerance = 1e-9;
-  double absolute_tolerance = 1e-10;    ///< N
+  double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;
   int lbfgs_memory = 20, lbfgs_refresh = 20;
 };
 
 struct SkinScene {
   SurfaceScene surface;
-  int order = 3;                        ///< p
+  int order = 3;  ///< p
   ThicknessScheme scheme = ThicknessScheme::stacked;
-  int composite_order = 3;              ///< q when composite
-  int triangle_degree = 0;              ///< 0 = 2p+2 (10 for p = 4)
-  int thickness_points = 0;             ///< per layer; 0 = q + 1
-  int contact_degree = 0;               ///< triangle degree on contact and ligament surfaces; 0 = max(10, 2p+2)
+  int composite_order = 3;   ///< q when composite
+  int triangle_degree = 0;   ///< 0 = 2p+2 (10 for p = 4)
+  int thickness_points = 0;  ///< per layer; 0 = q + 1
+  int contact_degree = 0;    ///< triangle degree on contact and ligament surfaces; 0 = max(10, 2p+2)
   RimCondition rim = RimCondition::clamped;
-  std::vector<LayerScene> layers;       ///< inner to outer
+  std::vector<LayerScene> layers;  ///< inner to outer
 };
 
 struct OutputScene {
   bool vtu = true, pictures = true, csv = true;
-  int every = 1;                        ///< frames between outputs
+  int every = 1;  ///< frames between outputs
 };
 
 struct Scene {
   std::string name, description;
-  std::string file;                     ///< where it came from, for messages
+  std::string file;  ///< where it came from, for messages
   SkinScene skin;
   std::optional<LigamentScene> ligaments;
   std::optional<BaseScene> base;
