@@ -68,58 +68,59 @@ struct LiteralKernel {
   }
 };
 
-/// One pass over the candidates. Signed distances are taken relative to the first one in support, σ = s − s₀,
-/// so that the differences sᵢ − g lose nothing (on a plane σ is round-off and all curvature vanishes with
-/// it). No underflow to guard against: 1 − q ≥ 2⁻⁵³ inside the support, hence W ≥ 2⁻²¹².
+/// Two passes over the candidates: g first, so that the derivatives sum the differences sᵢ − g themselves.
+/// Signed distances are taken relative to the first one in support, σ = s − s₀, so that the differences lose
+/// nothing (on a plane σ is round-off and all curvature vanishes with it). No underflow to guard against: 1 −
+/// q ≥ 2⁻⁵³ inside the support, hence W ≥ 2⁻²¹².
 template <JetOrder order, class Samples, class Kernel>
 GapJet imls_sum(const Samples& samples, const std::vector<int>& candidates, const Vec3& x,
                 const Kernel& kernel) {
-  constexpr bool want_gradient = order != JetOrder::gap;
-  constexpr bool want_hessian = order == JetOrder::hessian;
-  double s0 = 0, w = 0, w_sigma = 0;            // Σ θ, Σ θ σ
-  double a_sum = 0, a_sigma = 0;                // Σ a, Σ a σ
-  Vec3 w_n = Vec3::Zero();                      // Σ θ n
-  Vec3 dw = Vec3::Zero(), dw_s = Vec3::Zero();  // Σ ∇θ, Σ σ ∇θ
-  Mat3 cross = Mat3::Zero();                    // Σ ∇θ nᵀ
-  Mat3 cc = Mat3::Zero(), cc_s = Mat3::Zero();  // Σ c d dᵀ, Σ σ c d dᵀ
+  double s0 = 0, w = 0, w_sigma = 0;  // W = Σ θ, Σ θ σ
   bool supported = false;
   for (const int i : candidates) {
-    const Vec3 d = x - samples[static_cast<std::size_t>(i)].point;
+    const auto& sample = samples[static_cast<std::size_t>(i)];
+    const Vec3 d = x - sample.point;
     const double d2 = d.squaredNorm();
     if (!kernel.supports(d2)) continue;
-    const Vec3& n = samples[static_cast<std::size_t>(i)].normal;
-    const double s = n.dot(d);
+    const double s = sample.normal.dot(d);
     if (!supported) s0 = s;
     supported = true;
-    const double sigma = s - s0;
-    const KernelJet k = kernel(d2);
-    w += k.theta;
-    w_sigma += k.theta * sigma;
-    if constexpr (want_gradient) {
-      const Vec3 d_theta = k.a * d;
-      w_n += k.theta * n;
-      dw += d_theta;
-      dw_s += sigma * d_theta;
-      if constexpr (want_hessian) {
-        a_sum += k.a;
-        a_sigma += k.a * sigma;
-        cross += d_theta * n.transpose();
-        const Mat3 dd = k.c * Mat3(d * d.transpose());  // in this order it is symmetric to the bit
-        cc += dd;
-        cc_s += sigma * dd;
-      }
-    }
+    const double theta = kernel(d2).theta;
+    w += theta;
+    w_sigma += theta * (s - s0);
   }
   GapJet jet;
   jet.supported = supported;
   if (!supported) return jet;
   const double gamma = w_sigma / w;  // g − s₀
   jet.gap = s0 + gamma;
-  if constexpr (want_gradient) jet.gradient = (w_n + dw_s - gamma * dw) / w;
-  if constexpr (want_hessian) {
-    const Mat3 half = cross - dw * jet.gradient.transpose();
-    jet.hessian = (half + half.transpose() + cc_s - gamma * cc) / w;
-    jet.hessian.diagonal().array() += (a_sigma - gamma * a_sum) / w;
+  if constexpr (order == JetOrder::gap) return jet;
+
+  Vec3 slope = Vec3::Zero();  // Σ θ n + (s − g) ∇θ
+  Vec3 dw = Vec3::Zero();     // ∇W
+  double isotropic = 0;       // Σ (s − g) a
+  Mat3 half = Mat3::Zero();  // Σ d (a n + ½ (s − g) c d)ᵀ: with its transpose the rest of the bracket in ∇²g
+  for (const int i : candidates) {
+    const auto& sample = samples[static_cast<std::size_t>(i)];
+    const Vec3 d = x - sample.point;
+    const double d2 = d.squaredNorm();
+    if (!kernel.supports(d2)) continue;
+    const double difference = (sample.normal.dot(d) - s0) - gamma;
+    const KernelJet k = kernel(d2);
+    const double a_difference = k.a * difference;
+    slope += k.theta * sample.normal + a_difference * d;
+    if constexpr (order == JetOrder::hessian) {
+      dw += k.a * d;
+      isotropic += a_difference;
+      const Vec3 right = k.a * sample.normal + (0.5 * k.c * difference) * d;
+      half.noalias() += d * right.transpose();
+    }
+  }
+  jet.gradient = slope / w;
+  if constexpr (order == JetOrder::hessian) {
+    half -= dw * jet.gradient.transpose();
+    jet.hessian = (half + half.transpose()) / w;
+    jet.hessian.diagonal().array() += isotropic / w;
   }
   return jet;
 }
