@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
   rhytid::rules::SearchOptions options;
   std::string csv = "data/quadrature/triangle_rules.csv", list = "sim/element/triangle_rules.inc";
   app.add_option("--degree-max", degree_max, "highest degree")
-      ->check(CLI::Range(1, 14))
+      ->check(CLI::Range(1, 13))
       ->capture_default_str();
   app.add_option("--seed", options.seed, "seed of the random starts")->capture_default_str();
   app.add_option("--starts", options.starts, "random starts for each orbit structure")->capture_default_str();
