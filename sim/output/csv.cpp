@@ -1,0 +1,56 @@
+#include "sim/output/csv.h"
+
+#include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
+#include "sim/output/text.h"
+
+namespace rhytid {
+
+namespace {
+
+std::string quoted(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"') out += '"';
+    out += c;
+  }
+  return out + '"';
+}
+
+std::string cell_text(const CsvCell& cell) {
+  if (const auto* number = std::get_if<double>(&cell)) return exact_text(*number);
+  if (const auto* count = std::get_if<std::int64_t>(&cell)) return std::to_string(*count);
+  return quoted(std::get<std::string>(cell));
+}
+
+}  // namespace
+
+CsvTable::CsvTable(std::vector<CsvColumn> columns) : num_columns_(columns.size()) {
+  require(!columns.empty(), "CsvTable: no columns");
+  for (const CsvColumn& column : columns) {
+    if (&column != &columns.front()) text_ += ',';
+    text_ += quoted(column.unit.empty() ? column.name : column.name + "_" + column.unit);
+  }
+  text_ += '\n';
+}
+
+void CsvTable::add_row(std::vector<CsvCell> cells) {
+  require(cells.size() == num_columns_, "CsvTable: a row needs one cell per column");
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (i > 0) text_ += ',';
+    text_ += cell_text(cells[i]);
+  }
+  text_ += '\n';
+  ++num_rows_;
+}
+
+void CsvTable::add_numbers(const std::vector<double>& values) {
+  add_row(std::vector<CsvCell>(values.begin(), values.end()));
+}
+
+void CsvTable::write(const std::string& path) const {
+  write_file(path, text_);
+}
+
+}  // namespace rhytid
