@@ -53,8 +53,9 @@ void draw_glyph(Image& image, double left, double top, const Glyph& bits, double
   for (int y = y0; y < y1; ++y) {
     for (int x = x0; x < x1; ++x) {
       const double value = smooth_ink(bits, (x + 0.5 - left) / scale, (y + 0.5 - top) / scale);
-      // The contour at one half rounds the stair-steps; a ramp one picture pixel wide smooths it.
-      image.blend(x, y, colour, std::clamp((value - 0.45) * scale + 0.5, 0.0, 1.0));
+      // A contour somewhat below one half rounds stair-steps and keeps diagonal strokes connected; the ramp
+      // is one picture pixel wide.
+      image.blend(x, y, colour, std::clamp((value - 0.36) * scale + 0.5, 0.0, 1.0));
     }
   }
 }

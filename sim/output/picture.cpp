@@ -44,7 +44,7 @@ Vec3 shaded(const Vec3& albedo, const Vec3& normal, const Vec3& to_eye, const Li
   const double key = std::max(0.0, normal.dot(light.key)) * light.key_gain;
   const double fill = std::max(0.0, normal.dot(light.fill));
   const double sky = 0.5 + 0.5 * normal.dot(light.up);
-  const double diffuse = 0.52 * key + 0.14 * fill + 0.26 * sky;
+  const double diffuse = 0.60 * key + 0.12 * fill + 0.20 * sky;
   const double half = std::max(0.0, normal.dot((light.key + to_eye).normalized()));
   const Vec3 lit = albedo * diffuse + Vec3::Constant(gloss * std::pow(half, 40.0));
   // Soft shoulder: bright slopes stay distinguishable instead of clipping.
