@@ -90,8 +90,8 @@ double PlotScale::clamped_pixel(double value) const {
 
 std::vector<PlotScale::Tick> PlotScale::ticks(double spacing) const {
   const int target = std::max(2, static_cast<int>(std::abs(pixel_end_ - pixel_begin_) / spacing));
-  // Less than about a decade reads better with round numbers than with powers of ten.
-  if (logarithmic_ && high_ - low_ > 1.2) return logarithmic_ticks(spacing);
+  // Less than most of a decade reads better with round numbers than with powers of ten.
+  if (logarithmic_ && high_ - low_ > 0.7) return logarithmic_ticks(spacing);
   const double low = logarithmic_ ? std::pow(10, low_) : low_,
                high = logarithmic_ ? std::pow(10, high_) : high_;
   const std::vector<double> values = round_ticks(low, high, target);
@@ -115,8 +115,11 @@ std::vector<PlotScale::Tick> PlotScale::logarithmic_ticks(double spacing) const 
                               : plain        ? fixed_text(power, std::max(0, -e))
                                              : "1e" + std::to_string(e);
     if (shows(power) && (every == 1 || e % every == 0)) out.push_back({power, label});
-    for (int k = 2; k <= 9 && every == 1 && decade > 30; ++k) {
-      if (shows(k * power)) out.push_back({k * power, ""});
+    // 2 and 5 are labelled too where decades are long and few.
+    const bool label_2_5 = decade > 2 * spacing && high_ - low_ < 2.5;
+    for (int k = 2; k <= 9 && every == 1 && decade > 60; ++k) {
+      const bool labelled = label_2_5 && (k == 2 || k == 5);
+      if (shows(k * power)) out.push_back({k * power, labelled ? tick_text(k * power, power) : ""});
     }
   }
   return out;
@@ -127,7 +130,8 @@ SvgCanvas::SvgCanvas(int width, int height, std::string_view title) {
   const std::string w = std::to_string(width), h = std::to_string(height);
   text_ = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + w + "\" height=\"" + h +
           "\" viewBox=\"0 0 " + w + " " + h +
-          "\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"12\" role=\"img\">\n<title>" +
+          "\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"12\" stroke=\"none\" "
+          "role=\"img\">\n<title>" +
           xml_escaped(title) + "</title>\n";
   rectangle(0, 0, width, height, "fill=\"#fff\"");
   if (!title.empty())
@@ -155,9 +159,12 @@ void SvgCanvas::path(std::string_view data, std::string_view attributes) {
 
 void SvgCanvas::text(double x, double y, std::string_view content, std::string_view anchor,
                      std::string_view attributes, double rotate) {
-  text_ += "<text x=\"" + px(x) + "\" y=\"" + px(y) + "\" text-anchor=\"" + std::string(anchor) + "\" " +
-           std::string(attributes);
-  if (rotate != 0) text_ += " transform=\"rotate(" + px(rotate) + " " + px(x) + " " + px(y) + ")\"";
+  // A turned text is moved first: viewers agree on rotation about the origin, not all on rotation about a
+  // point.
+  const std::string place =
+      rotate == 0 ? "x=\"" + px(x) + "\" y=\"" + px(y) + "\""
+                  : "transform=\"translate(" + px(x) + " " + px(y) + ") rotate(" + px(rotate) + ")\"";
+  text_ += "<text " + place + " text-anchor=\"" + std::string(anchor) + "\" " + std::string(attributes);
   text_ += ">" + xml_escaped(content) + "</text>\n";
 }
 
