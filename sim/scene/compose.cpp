@@ -169,7 +169,7 @@ size_t item_index(const json& list, const std::string& key, const std::string& w
   const auto [end, status] = std::from_chars(key.data(), key.data() + key.size(), index);
   if (status == std::errc() && end == key.data() + key.size()) {
     if (index < list.size()) return index;
-    throw InputError(where, "item " + key.substr(0, 60) + " of " + pointer,
+    throw InputError(where, "item " + key.substr(0, 60) + " of " + shown_text(pointer),
                      "an item below " + std::to_string(list.size()));
   }
   if (const int named = find_named(list, key); named >= 0) return static_cast<size_t>(named);
@@ -178,7 +178,7 @@ size_t item_index(const json& list, const std::string& key, const std::string& w
     if (item.is_object() && item.contains("name") && item["name"].is_string()) names.push_back(item["name"]);
   const std::string nearest = nearest_word(key, names);
   throw InputError(
-      where, shown_json(key) + " in " + pointer,
+      where, shown_json(key) + " in " + shown_text(pointer),
       "the number" + (nearest.empty() ? std::string(" of an item")
                                       : " or name of an item, nearest is " + shown_json(nearest)));
 }
@@ -230,7 +230,8 @@ void apply_override(LocatedJson& target, const std::string& assignment, const st
       if (node->is_null()) *node = json::object();
       if (value.json.is_null() && node->is_object() && !node->contains(key)) return;  // nothing to remove
       if (!node->is_object())
-        throw InputError(where, shown_json(*node) + " at " + (pointer.empty() ? "the root" : pointer),
+        throw InputError(where,
+                         shown_json(*node) + " at " + (pointer.empty() ? "the root" : shown_text(pointer)),
                          "an object or a list there");
       if (is_last && value.json.is_null()) {
         node->erase(key);

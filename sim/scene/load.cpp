@@ -169,6 +169,7 @@ Scene parse_scene_text(std::string_view text, const std::string& file,
   LocatedJson scene;
   scene.json = json::object();
   merge(scene, own);
+  scene.origin[""] = own.where("");
   for (const std::string& assignment : overrides) apply_override(scene, assignment, file);
   return to_scene(scene, file);
 }

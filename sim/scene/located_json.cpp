@@ -37,6 +37,14 @@ struct CountingIterator {
   friend bool operator!=(const CountingIterator& a, const CountingIterator& b) { return a.at != b.at; }
 };
 
+/// At most `size` bytes, not cut inside a character.
+std::string shortened(const std::string& text, size_t size) {
+  if (text.size() <= size) return text;
+  size_t end = size - 3;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return text.substr(0, end) + "...";
+}
+
 /// SAX handler that builds the document and notes the line of every value.
 class Builder {
  public:
@@ -68,7 +76,7 @@ class Builder {
     return true;
   }
   /// The library's message without its prefix and its own idea of the place.
-  bool parse_error(size_t byte, const std::string&, const nlohmann::detail::exception& error) {
+  bool parse_error(size_t byte, const std::string& token, const nlohmann::detail::exception& error) {
     std::string message = error.what();
     const size_t column = message.find(", column ");
     const size_t start = message.find(": ", column == std::string::npos ? 0 : column);
@@ -77,7 +85,11 @@ class Builder {
     else if (const size_t bracket = message.find("] "); bracket != std::string::npos)
       message = message.substr(bracket + 2);
     std::replace(message.begin(), message.end(), '\n', ' ');
-    const size_t index = std::min(byte > 0 ? byte - 1 : 0, text_.size());
+    size_t index = std::min(byte > 0 ? byte - 1 : 0, text_.size());
+    // Point to the beginning of the word that was not expected rather than to its end.
+    if (!token.empty() && token.size() <= byte && byte <= text_.size() &&
+        text_.substr(byte - token.size(), token.size()) == token)
+      index = byte - token.size();
     const std::string_view before = text_.substr(0, index);
     const size_t newline = before.rfind('\n');
     const size_t in_line = newline == std::string_view::npos ? index : index - newline - 1;
@@ -187,15 +199,13 @@ std::vector<std::string> split_pointer(std::string_view pointer, const std::stri
   return keys;
 }
 
+std::string shown_text(const std::string& text) {
+  const std::string quoted = json(text).dump(-1, ' ', false, json::error_handler_t::replace);
+  return shortened(quoted.substr(1, quoted.size() - 2), 200);
+}
+
 std::string shown_json(const json& value) {
-  std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
-  if (text.size() > 60) {
-    size_t end = 57;
-    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80)
-      --end;  // not inside a character
-    text = text.substr(0, end) + "...";
-  }
-  return text;
+  return shortened(value.dump(-1, ' ', false, json::error_handler_t::replace), 60);
 }
 
 int find_named(const json& list, std::string_view name) {

@@ -29,6 +29,9 @@ std::string escape_key(std::string_view key);
 /// unless it is empty or starts with '/'.
 std::vector<std::string> split_pointer(std::string_view pointer, const std::string& where);
 
+/// Text for the middle of a message: control characters and broken UTF-8 escaped, shortened to about 200
+/// bytes.
+std::string shown_text(const std::string& text);
 /// The value as compact JSON, shortened to about 60 characters, always one line of valid UTF-8.
 std::string shown_json(const nlohmann::json& value);
 

@@ -18,7 +18,7 @@ struct Place {
   std::string pointer, shown;
 
   Place key(const std::string& key) const {
-    return {pointer + "/" + escape_key(key), shown + "/" + escape_key(key)};
+    return {pointer + "/" + escape_key(key), shown + "/" + shown_text(escape_key(key))};
   }
   Place item(size_t index, const std::string& name) const {
     const std::string number = std::to_string(index);
