@@ -77,6 +77,7 @@ class Merger {
       if (index < 0) {
         index = static_cast<int>(into.size());
         into.push_back(item.is_object() ? json{{"name", name}} : json());
+        target_.origin[to + "/" + std::to_string(index)] = patch_.where(item_from);
       }
       value(into[static_cast<size_t>(index)], to + "/" + std::to_string(index), item, item_from,
             node->child("*"));

@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "sim/scene/rules_table.h"
+
 namespace rhytid {
 namespace {
 
@@ -38,6 +40,21 @@ std::string join(const std::vector<std::string>& words) {
 }
 
 }  // namespace
+
+const std::vector<Rule>& scene_rules() {
+  static const std::vector<Rule> rules = [] {
+    std::vector<Rule> all = {
+        {.pointer = "", .type = RuleType::object, .is_required = true, .doc = "A scene."},
+        {.pointer = "/$schema", .type = RuleType::string, .doc = "For editors; ignored."},
+        {.pointer = "/name", .type = RuleType::string, .fallback = "", .doc = "Short name of the scene."},
+        {.pointer = "/description", .type = RuleType::string, .fallback = "", .doc = "What it shows."},
+    };
+    for (std::vector<Rule> (*group)() : {&skin_rules, &ligament_rules, &contact_rules, &run_rules})
+      for (Rule& rule : group()) all.push_back(std::move(rule));
+    return all;
+  }();
+  return rules;
+}
 
 const RuleNode* RuleNode::child(std::string_view key) const {
   for (const auto& [name, node] : children)

@@ -93,6 +93,19 @@ TEST(LoadScene, RoundTrips) {
   }
 }
 
+TEST(LoadScene, RoundTripsAMeshFile) {
+  const char* text = R"({"skin": {
+    "surface": {"file": "/a/face.obj", "unit": "in", "crop": {"centre": [1, 2, "3 cm"], "radius": "4 cm"}},
+    "layers": [{"name": "soft", "thickness": 2, "youngs_modulus": 0.02}]}})";
+  const Scene scene = parse_scene_text(text, "a.json");
+  EXPECT_EQ(scene.skin.surface.mm_per_unit, 25.4);
+  EXPECT_EQ(scene.skin.surface.crop_centre, Vec3(1, 2, 30));
+  EXPECT_EQ(scene.skin.surface.crop_radius, 40);
+  const json written = scene_to_json(scene);
+  EXPECT_EQ(written["skin"]["surface"]["mm_per_unit"], 25.4);
+  EXPECT_EQ(scene_to_json(parse_scene(written, "a.json")), written);
+}
+
 class LoadFiles : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -160,6 +173,39 @@ TEST_F(LoadFiles, ErrorsNameTheFileAndLineThatWroteTheValue) {
   EXPECT_EQ(error_of(bad), bad + ":3: /skin/order: got 2.5, expected an integer from 1 to 4");
   EXPECT_EQ(error_of(good, {"/skin/order=9"}),
             good + " (--set): /skin/order: got 9, expected an integer from 1 to 4");
+}
+
+// Removing an item moves the ones behind it up; their lines must move with them.
+TEST_F(LoadFiles, ListsOfNamedItemsArePatchedByName) {
+  const std::string base =
+      write("base.json", R"({"skin": {"surface": {"grid": {"size": [1, 1], "cells": [1, 1]}},
+    "layers": [{"name": "a", "thickness": 1, "youngs_modulus": 1},
+               {"name": "b", "thickness": 1,
+                "youngs_modulus": -1},
+               {"name": "c", "thickness": 1, "youngs_modulus": 1}]}})");
+  const auto with_layers = [this](const std::string& layers) {
+    return write("scene.json", R"({"extends": "base.json",
+      "skin": {"layers": )" + layers +
+                                   "}}");
+  };
+  EXPECT_THAT(error_of(with_layers(R"({"a": null})")),
+              ::testing::StartsWith(base + ":4: /skin/layers/b/youngs_mod"));
+  const std::string path = with_layers(
+      R"({"a": null, "b": {"youngs_modulus": "2 MPa"}, "d": {"thickness": 3, "youngs_modulus": 4}})");
+  const Scene scene = load_scene(path);
+  ASSERT_EQ(scene.skin.layers.size(), 3u);
+  EXPECT_EQ(scene.skin.layers[0].youngs_modulus, 2);
+  EXPECT_EQ(scene.skin.layers[1].name, "c");
+  EXPECT_EQ(scene.skin.layers[2].name, "d");
+  // An appended item that was meant to be another one lacks what is required.
+  EXPECT_THAT(error_of(with_layers(R"({"bb": {"youngs_modulus": 2}, "b": null})")),
+              ::testing::StartsWith(path + ":2: /skin/layers/bb/thickness: got nothing"));
+  // A list replaces the whole list.
+  EXPECT_EQ(
+      load_scene(with_layers(R"([{"name": "e", "thickness": 1, "youngs_modulus": 1}])")).skin.layers.size(),
+      1u);
+  EXPECT_THAT(error_of(with_layers(R"([{"name": "b", "youngs_modulus": 1}])")),
+              ::testing::HasSubstr("/skin/layers/b/thickness: got nothing"));
 }
 
 TEST_F(LoadFiles, RefusesCyclesAndMissingFiles) {
