@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -23,22 +24,27 @@ std::string folder_of(const std::string& path) {
   return slash == 0 ? "/" : path.substr(0, slash);
 }
 
-/// The permissions an ordinary open() would give; mkstemp makes the file private to the user.
-mode_t default_mode() {
-  const mode_t mask = umask(0);
-  umask(mask);
-  return 0666 & ~mask;
+/// Opens a new file beside `path` under a name nobody else uses and returns the descriptor, −1 on failure.
+/// mkstemp would do, but makes files private, and widening that needs umask(), which is not thread-safe.
+int open_temporary(const std::string& path, std::string& name) {
+  static std::atomic<unsigned> counter = 0;
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    name = path + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+    const int descriptor = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0 || errno != EEXIST) return descriptor;  // EEXIST: left by a killed process
+  }
+  return -1;
 }
 
 }  // namespace
 
-AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), temporary_(path_ + ".tmp-XXXXXX") {
+AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
   // rename() onto a folder would fail only after all the work, so look first.
   struct stat status {};
   if (stat(path_.c_str(), &status) == 0 && S_ISDIR(status.st_mode)) {
     throw InputError(path_ + ": cannot write a file here: it is a folder");
   }
-  descriptor_ = mkstemp(temporary_.data());
+  descriptor_ = open_temporary(path_, temporary_);
   if (descriptor_ < 0) fail("cannot create the file");
 }
 
@@ -66,7 +72,7 @@ void AtomicFile::write(std::string_view bytes) {
 
 void AtomicFile::commit() {
   require(descriptor_ >= 0, "AtomicFile: commit twice");
-  if (fchmod(descriptor_, default_mode()) != 0 || fsync(descriptor_) != 0) fail("cannot flush");
+  if (fsync(descriptor_) != 0) fail("cannot flush");
   if (rename(temporary_.c_str(), path_.c_str()) != 0) fail("cannot rename the finished file");
   close(descriptor_);
   descriptor_ = -1;

@@ -13,7 +13,7 @@ namespace rhytid {
 
 namespace {
 
-constexpr png_uint_32 max_side = 32768;
+constexpr png_uint_32 max_side = 16384;
 
 png_uint_32 format_of(int channels) {
   return channels == 1 ? PNG_FORMAT_GRAY : channels == 3 ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA;

@@ -50,7 +50,7 @@ std::string encode_png(const Image& image);
 /// Writes a PNG atomically. Throws InputError naming the path.
 void write_png(const std::string& path, const Image& image);
 /// Reads a PNG as 8-bit grey, RGB or RGBA; palettes and small depths are expanded, 16 bits rounded to 8.
-/// Throws InputError naming the path when it is missing, not a PNG, damaged, or above 32768 pixels a side.
+/// Throws InputError naming the path when it is missing, not a PNG, damaged, or above 16384 pixels a side.
 Image read_png(const std::string& path);
 
 }  // namespace rhytid
