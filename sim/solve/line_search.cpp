@@ -45,7 +45,8 @@ LineSearchResult line_search(Objective& objective, const Iterate& at, const Vect
     result.accepted = change <= kArmijo * step * slope;
     if (!result.accepted && change <= noise) {
       const double slope_there = result.next.gradient.dot(direction);
-      result.accepted = 0.9 * slope <= slope_there && slope_there <= (2 * kArmijo - 1) * slope;
+      result.accepted = (0.9 * slope <= slope_there && slope_there <= (2 * kArmijo - 1) * slope) ||
+                        result.next.gradient.norm() <= 0.5 * at.gradient.norm();
     }
     if (result.accepted) return result;
     // Minimum of the parabola through E, slope and E(step).

@@ -27,10 +27,10 @@ struct LineSearchResult {
 };
 
 /// From `at` along `direction` with slope = gradient·direction < 0. The first step is 1, but at most 0.9 of
-/// the largest feasible one. A trial of energy E(a) is accepted by Armijo, E(a) ≤ E + 1e-4 a slope; or, where
-/// rounding hides that decrease, by the approximate Wolfe test E(a) ≤ E + noise and 0.9 slope ≤ slope(a) ≤
-/// (2e-4 − 1) slope (Hager and Zhang 2005). Non-finite trials shorten the step by 0.3, others by quadratic
-/// interpolation within [0.1, 0.5].
+/// the largest feasible one. A trial of energy E(a) is accepted by Armijo, E(a) ≤ E + 1e-4 a slope. Where
+/// rounding may hide that decrease, E(a) ≤ E + noise, the gradient decides: accepted by the approximate Wolfe
+/// test (Hager and Zhang 2005) 0.9 slope ≤ slope(a) ≤ (2e-4 − 1) slope, or when its norm has halved.
+/// Non-finite trials shorten the step by 0.3, others by quadratic interpolation within [0.1, 0.5].
 LineSearchResult line_search(Objective& objective, const Iterate& at, const VectorXd& direction,
                              double slope);
 

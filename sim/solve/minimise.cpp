@@ -17,7 +17,9 @@ constexpr int kProjectedIterations = 2;    // with the projected Hessian after a
 constexpr double kShift = 1e-9;            // added to the projected Hessian, relative to its largest diagonal
 constexpr double kLargestShift = 1e-2;     // where giving up starts
 constexpr int kMaxLineSearchFailures = 4;  // in a row, each with a more cautious direction
-constexpr int kMaxStagnantSteps = 5;       // below the energy's resolution without halving the residual
+// Steps below the energy's resolution without halving the residual: Newton's converge quadratically, others
+// slowly.
+constexpr int kRawPatience = 5, kPatience = 20;
 constexpr int kMaxNegativeCurvatureExits = 10;
 constexpr double kLbfgsRefreshStep = 1e-6;  // paper.tex, "Non-Linear Solver"
 constexpr unsigned kNegativeCurvatureSeed = 20240229;
@@ -51,7 +53,7 @@ class Minimisation {
   Status no_projected_factor() const;
   /// After an accepted step of the given slope: true when steps have sunk below the energy's resolution and
   /// no longer reduce the residual.
-  bool stagnates(double slope, double noise);
+  bool stagnates(double slope, double noise, int patience);
   void polish();
   bool leave_along_negative_curvature(Iterate& next);
 
@@ -123,7 +125,7 @@ MinimiserStatus Minimisation::no_projected_factor() const {
   return Status::line_search_failed;
 }
 
-bool Minimisation::stagnates(double slope, double noise) {
+bool Minimisation::stagnates(double slope, double noise, int patience) {
   if (-slope > noise) {
     stagnant_steps_ = 0;
     stagnation_residual_ = report_.residual;
@@ -134,7 +136,7 @@ bool Minimisation::stagnates(double slope, double noise) {
     stagnant_steps_ = 0;
     return false;
   }
-  return ++stagnant_steps_ >= kMaxStagnantSteps;
+  return ++stagnant_steps_ >= patience;
 }
 
 void Minimisation::polish() {
@@ -196,11 +198,11 @@ MinimiserStatus Minimisation::newton() {
     if (small()) {
       if (raw && options_.polish) polish();
       if (raw || !options_.certify_minimum) return Status::converged;
+      if (report_.iterations >= options_.max_iterations) return Status::max_iterations;
       Iterate next;
       if (report_.negative_curvature_exits >= kMaxNegativeCurvatureExits ||
           !leave_along_negative_curvature(next))
         return Status::not_a_minimum;
-      if (report_.iterations >= options_.max_iterations) return Status::max_iterations;
       ++report_.negative_curvature_exits;
       projected_left = failures = 0;
       shift_ = kShift;
@@ -220,16 +222,19 @@ MinimiserStatus Minimisation::newton() {
     if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
     report_.evaluations += found.evaluations;
     if (!found.accepted) {
-      if (std::abs(slope) <= noise) return Status::stagnated;
-      if (++failures >= kMaxLineSearchFailures) return Status::line_search_failed;
-      projected_left = kProjectedIterations;
+      const bool below_resolution = std::abs(slope) <= noise;
+      if (++failures >= kMaxLineSearchFailures)
+        return below_resolution ? Status::stagnated : Status::line_search_failed;
+      if (below_resolution && (raw || always_projected))
+        return Status::stagnated;  // the best direction there is
+      projected_left = below_resolution ? 0 : kProjectedIterations;
       if (!raw) shift_ *= 10;
       continue;
     }
     failures = 0;
     shift_ = kShift;
     if (const auto stop = accept(std::move(found.next))) return *stop;
-    if (!small() && stagnates(slope, noise)) return Status::stagnated;
+    if (!small() && stagnates(slope, noise, raw ? kRawPatience : kPatience)) return Status::stagnated;
   }
 }
 
@@ -258,7 +263,7 @@ MinimiserStatus Minimisation::lbfgs_then_newton() {
     since_refresh = found.step < kLbfgsRefreshStep ? -1 : since_refresh + 1;
     ++report_.lbfgs_iterations;
     if (const auto stop = accept(std::move(found.next))) return *stop;
-    if (!small() && stagnates(slope, noise)) break;
+    if (!small() && stagnates(slope, noise, kPatience)) break;
   }
   stagnant_steps_ = 0;
   return newton();
