@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cstdio>
+#include <functional>
 #include <limits>
 #include <queue>
 
@@ -126,6 +128,12 @@ TriangleSurface crop_geodesic_disc(const TriangleSurface& surface, const Vec3& c
   };
   const int source = nearest_used_vertex(surface, centre);
   if (source < 0) nothing_left("the surface has none");
+  const double away = (surface.vertices.row(source).transpose() - centre).norm();
+  if (away > radius) {
+    char text[96];
+    std::snprintf(text, sizeof text, "the centre is %.4g mm away from the surface; is it in mm?", away);
+    nothing_left(text);
+  }
   const std::vector<double> distance = edge_distances(surface, source, radius);
   std::vector<int> kept;
   for (int face = 0; face < static_cast<int>(surface.faces.size()); ++face) {

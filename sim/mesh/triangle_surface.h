@@ -35,7 +35,7 @@ TriangleSurface grid_surface(double size_x, double size_y, int nx, int ny, GridP
 
 /// Keeps the faces whose three vertices lie within geodesic (edge-path) distance `radius` of the vertex
 /// nearest to `centre`, then the largest edge-connected component, without dangling (single-vertex) contacts.
-/// Throws InputError when nothing is left.
+/// Throws InputError when nothing is left or `centre` is farther than `radius` from the nearest vertex.
 TriangleSurface crop_geodesic_disc(const TriangleSurface& surface, const Vec3& centre, double radius);
 
 /// Refuses what the simulator cannot extrude: no faces, index out of range, degenerate or duplicate faces,

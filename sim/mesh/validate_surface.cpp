@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cstdio>
 #include <map>
 
 #include "sim/core/error.h"

@@ -129,6 +129,11 @@ TEST(CropGeodesicDisc, SaysWhenNothingIsLeft) {
   EXPECT_THAT(line, HasSubstr("vertex 13"));
 }
 
+TEST(CropGeodesicDisc, SaysWhenTheCentreIsFarAway) {
+  const TriangleSurface grid = grid_surface(20, 20, 20, 20, GridPattern::union_jack);
+  EXPECT_THAT(input_error([&] { crop_geodesic_disc(grid, Vec3(0, 0, 30), 10); }), HasSubstr("30 mm away"));
+}
+
 TEST(VertexNormals, ApproachTheSphere) {
   TriangleSurface cap = grid_surface(8, 8, 16, 16, GridPattern::union_jack);
   for (int v = 0; v < cap.vertices.rows(); ++v)
