@@ -1,5 +1,6 @@
 #include "fitting/cameras.h"
 
+#include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>

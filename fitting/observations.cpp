@@ -1,5 +1,6 @@
 #include "fitting/observations.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <charconv>

@@ -72,13 +72,16 @@ Measurement measure(const Follower& f, const FlowGuess& guess, const FrameView& 
   Measurement m;
   m.forward_backward_px = guess.forward_backward_px;
   const int half = o.window_px / 2;
-  if (guess.found && !view.image->contains(guess.pixel.x(), guess.pixel.y()))
-    m.refusal = Refusal::outside;
+  const bool flowed = guess.found && guess.forward_backward_px <= o.max_forward_backward_px;
+  // When the flow failed, the best guess for what covers the point is what covers the place where it was.
+  const Vec2 place = flowed ? guess.pixel : f.warp.centre;
+  if (covered_fraction(*view.mask, place, half) > o.max_covered_fraction)
+    m.refusal = Refusal::occluded;
   else if (!guess.found)
     m.refusal = Refusal::flow;
-  else if (covered_fraction(*view.mask, guess.pixel, half) > o.max_covered_fraction)
-    m.refusal = Refusal::occluded;
-  else if (guess.forward_backward_px > o.max_forward_backward_px)
+  else if (!view.image->contains(guess.pixel.x(), guess.pixel.y()))
+    m.refusal = Refusal::outside;
+  else if (!flowed)
     m.refusal = Refusal::forward_backward;
   if (m.refusal != Refusal::none) return m;
 

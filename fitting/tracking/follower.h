@@ -2,6 +2,7 @@
 // Used by tracker.cpp only.
 #pragma once
 
+#include "fitting/tracking/optical_flow.h"
 #include "fitting/tracking/patch_alignment.h"
 #include "fitting/tracking/tracker.h"
 
@@ -22,13 +23,6 @@ struct Follower {
   double baseline = 0;     ///< first residual against this template, grey; 0 = none yet
   double correlation = 1;  ///< of the last accepted alignment
   double residual = 0;     ///< last accepted residual, grey
-};
-
-/// What optical flow says about one point.
-struct FlowGuess {
-  Vec2 pixel;
-  double forward_backward_px;
-  bool found;
 };
 
 /// Everything about a frame that measuring a point needs.

@@ -167,7 +167,9 @@ FrameSource::FrameSource(FrameSourceOptions options)
     r.quantum = first.depth() == CV_16U ? 255.0 / 65535.0 : 1.0;
     r.rate = o.frames_per_second > 0 ? o.frames_per_second : 1;
   } else {
-    if (!r.video.open(o.path)) throw InputError(o.path, "a file that no decoder opens", "a readable video");
+    // Named back ends: trying all of them fills the terminal with the complaints of those that do not fit.
+    if (!r.video.open(o.path, cv::CAP_FFMPEG) && !r.video.open(o.path, cv::CAP_OPENCV_MJPEG))
+      throw InputError(o.path, "a file that no decoder opens", "a readable video");
     r.total = std::max(0, static_cast<int>(r.video.get(cv::CAP_PROP_FRAME_COUNT)));
     r.size = {static_cast<int>(r.video.get(cv::CAP_PROP_FRAME_WIDTH)),
               static_cast<int>(r.video.get(cv::CAP_PROP_FRAME_HEIGHT))};

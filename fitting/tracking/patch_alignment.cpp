@@ -304,6 +304,17 @@ Eigen::Matrix2d ResidualCorrelation::covariance(const Alignment& a, double sigma
     }
   const Eigen::Matrix2d excess = total - 0.25 * a.unit_covariance;
   if (!(excess.determinant() > 0 && excess.trace() > 0)) total = a.unit_covariance;
+
+  // Noise in the gradients: JᵀJ = M + N σ_g² I, while the curvature of the cost is M alone. The residual is
+  // the difference of two images, its central difference has variance σ² (1 − ρ(2))/2, half of it from each
+  // image.
+  const double rho2 = 0.5 * (rho_[0][kReach + 2] + rho_[2][kReach]);
+  const double gradient_noise = sigma * sigma * (1 - rho2) / 4;
+  const Eigen::Matrix2d share = static_cast<double>(a.residuals.size()) * gradient_noise * a.unit_covariance;
+  // Beyond one half the gradients are mostly noise and the expansion means nothing.
+  const double cap = std::min(1.0, 0.5 / std::max(share.trace(), 1e-300));
+  const Eigen::Matrix2d correction = (Eigen::Matrix2d::Identity() - cap * share).inverse();
+  total = correction * total * correction.transpose();
   return sigma * sigma * total;
 }
 

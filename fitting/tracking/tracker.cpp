@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 
 #include "fitting/tracking/follower.h"
+#include "fitting/tracking/optical_flow.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
@@ -21,49 +20,6 @@ double quantile(std::vector<double>* values, double fraction) {
   return *nth;
 }
 
-void check(bool good, const char* name, double value, const char* expected) {
-  if (!good) throw InputError(std::string("tracker: ") + name, std::to_string(value), expected);
-}
-
-void validate(const TrackerOptions& o) {
-  check(o.window_px >= 7 && o.window_px <= 201 && o.window_px % 2 == 1, "window_px", o.window_px,
-        "odd, 7 to 201 px");
-  check(o.smoothing_px >= 0 && o.smoothing_px <= 10, "smoothing_px", o.smoothing_px, "0 to 10 px");
-  check(o.pyramid_levels >= 0 && o.pyramid_levels <= 8, "pyramid_levels", o.pyramid_levels, "0 to 8");
-  check(o.max_forward_backward_px > 0, "max_forward_backward_px", o.max_forward_backward_px, "above 0 px");
-  check(o.max_correction_px > 0, "max_correction_px", o.max_correction_px, "above 0 px");
-  check(o.min_correlation >= 0 && o.min_correlation < 1, "min_correlation", o.min_correlation,
-        "from 0 to below 1");
-  check(o.max_residual_jump > 1, "max_residual_jump", o.max_residual_jump, "above 1");
-  check(o.max_sigma_px > 0, "max_sigma_px", o.max_sigma_px, "above 0 px");
-  check(o.max_covered_fraction >= 0 && o.max_covered_fraction < 1, "max_covered_fraction",
-        o.max_covered_fraction, "from 0 to below 1");
-  check(o.update_residual_ratio == 0 || o.update_residual_ratio > 1, "update_residual_ratio",
-        o.update_residual_ratio, "0 or above 1");
-  check(o.update_correlation >= 0 && o.update_correlation <= 1, "update_correlation", o.update_correlation,
-        "0 to 1");
-  check(o.max_gradient_change > 0, "max_gradient_change", o.max_gradient_change, "above 0");
-  check(o.redetect_search_px >= 1 && o.redetect_search_px <= 100, "redetect_search_px", o.redetect_search_px,
-        "1 to 100 px");
-  check(!o.camera.empty() && o.camera.find_first_of(",\r\n") == std::string::npos, "camera", 0,
-        "a name without commas");
-}
-
-/// Removes slow light from the image, because optical flow compares raw values: (I − local mean)/local
-/// deviation.
-cv::Mat flatten_lighting(const cv::Mat& grey, int window) {
-  const cv::Size box(2 * window + 1, 2 * window + 1);
-  cv::Mat mean, square, deviation, out;
-  cv::boxFilter(grey, mean, CV_32F, box, {-1, -1}, true, cv::BORDER_REFLECT);
-  cv::boxFilter(grey.mul(grey), square, CV_32F, box, {-1, -1}, true, cv::BORDER_REFLECT);
-  cv::sqrt(cv::max(square - mean.mul(mean), 0), deviation);
-  // +2 grey: where there is less texture than that, noise must not be blown up to full scale. 40 grey per
-  // deviation keeps three deviations inside 0..255.
-  cv::Mat scaled = (grey - mean) / (deviation + 2.0f);
-  scaled.convertTo(out, CV_8U, 40, 128);
-  return out;
-}
-
 SplineImage smooth_image(const cv::Mat& grey, double smoothing_px) {
   if (!(smoothing_px > 0)) return SplineImage(grey);
   cv::Mat smooth;
@@ -71,38 +27,6 @@ SplineImage smooth_image(const cv::Mat& grey, double smoothing_px) {
   cv::GaussianBlur(grey, smooth, {2 * reach + 1, 2 * reach + 1}, smoothing_px, smoothing_px,
                    cv::BORDER_REFLECT);
   return SplineImage(smooth);
-}
-
-using Pyramid = std::vector<cv::Mat>;
-
-Pyramid flow_pyramid(const cv::Mat& grey, const TrackerOptions& o) {
-  Pyramid pyramid;
-  cv::buildOpticalFlowPyramid(flatten_lighting(grey, o.window_px), pyramid, {o.window_px, o.window_px},
-                              o.pyramid_levels);
-  return pyramid;
-}
-
-/// Flow there and back for all active followers, in their order.
-std::vector<FlowGuess> flow(const Pyramid& from, const Pyramid& to, const std::vector<Follower>& followers,
-                            const TrackerOptions& o) {
-  std::vector<cv::Point2f> start, there, back;
-  for (const Follower& f : followers)
-    if (f.active)
-      start.emplace_back(static_cast<float>(f.warp.centre.x()), static_cast<float>(f.warp.centre.y()));
-  std::vector<FlowGuess> guesses;
-  if (start.empty()) return guesses;
-  std::vector<uchar> found, found_back;
-  const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 40, 0.003);
-  const cv::Size window(o.window_px, o.window_px);
-  cv::calcOpticalFlowPyrLK(from, to, start, there, found, cv::noArray(), window, o.pyramid_levels, stop, 0,
-                           1e-5);
-  cv::calcOpticalFlowPyrLK(to, from, there, back, found_back, cv::noArray(), window, o.pyramid_levels, stop,
-                           0, 1e-5);
-  for (std::size_t i = 0; i < start.size(); ++i)
-    guesses.push_back({{there[i].x, there[i].y},
-                       std::hypot(back[i].x - start[i].x, back[i].y - start[i].y),
-                       found[i] && found_back[i]});
-  return guesses;
 }
 
 /// One run over a source.
@@ -154,7 +78,7 @@ class Run {
   void start(const Frame& frame) {
     const int half = o_.window_px / 2;
     image_ = smooth_image(frame.grey, o_.smoothing_px);
-    pyramid_ = flow_pyramid(frame.grey, o_);
+    pyramid_ = flow_pyramid(frame.grey, o_.window_px, o_.pyramid_levels);
     for (const Vec2& seed : choose_seeds(frame.grey, mask_of(frame), half + 3, o_.seeds)) {
       Follower f;
       f.patch = cut_template(image_, seed, half);
@@ -186,10 +110,11 @@ class Run {
 
   void advance(const Frame& frame) {
     const SplineImage image = smooth_image(frame.grey, o_.smoothing_px);
-    const Pyramid pyramid = flow_pyramid(frame.grey, o_);
+    const FlowPyramid pyramid = flow_pyramid(frame.grey, o_.window_px, o_.pyramid_levels);
     const cv::Mat mask = mask_of(frame);
     const FrameView view{&image, &image_, &mask, least_residual_};
-    const std::vector<FlowGuess> guesses = flow(pyramid_, pyramid, followers_, o_);
+    const std::vector<FlowGuess> guesses =
+        flow(pyramid_, pyramid, active_positions(), o_.window_px, o_.pyramid_levels);
 
     std::vector<int> guess_of(followers_.size(), -1);
     for (std::size_t i = 0, next = 0; i < followers_.size(); ++i)
@@ -234,6 +159,13 @@ class Run {
     report_.frames.push_back(counts);
     image_ = image;
     pyramid_ = pyramid;
+  }
+
+  std::vector<Vec2> active_positions() const {
+    std::vector<Vec2> positions;
+    for (const Follower& f : followers_)
+      if (f.active) positions.push_back(f.warp.centre);
+    return positions;
   }
 
   static double typical_residual(const std::vector<Measurement>& measured) {
@@ -400,7 +332,7 @@ class Run {
   TrackerReport report_;
   std::vector<Follower> followers_;
   SplineImage image_;  // of the last frame
-  Pyramid pyramid_;
+  FlowPyramid pyramid_;
   ResidualCorrelation correlation_{{}};
   double least_residual_ = 0, typical_baseline_ = 0;
   int baseline_frame_ = -1;
@@ -409,39 +341,8 @@ class Run {
 
 }  // namespace
 
-const char* to_string(Refusal refusal) {
-  constexpr std::array<const char*, kNumRefusals> names = {
-      "none",          "occluded",    "outside",  "flow",       "forward_backward",
-      "not_converged", "correlation", "residual", "correction", "uncertain"};
-  return names.at(static_cast<std::size_t>(refusal));
-}
-
-const char* to_string(TrackerEnd end) {
-  switch (end) {
-    case TrackerEnd::finished:
-      return "finished";
-    case TrackerEnd::source_ended_early:
-      return "the footage ended early";
-    case TrackerEnd::interrupted:
-      return "interrupted";
-  }
-  throw ContractError("unknown TrackerEnd");
-}
-
-std::string summary(const TrackerReport& r) {
-  char text[400];
-  std::snprintf(
-      text, sizeof text,
-      "%d of %d frames (%s); %d tracks started, %d kept to the end, %d in every frame\n"
-      "forward-backward median %.3f px, 95 %% %.3f px; noise %.2f grey; sigma %.3f px; %d template updates",
-      r.frames_processed, r.frames_asked, to_string(r.end), r.started, r.kept, r.unbroken,
-      r.forward_backward_median_px, r.forward_backward_95_px, r.noise_grey, r.sigma_median_px,
-      r.template_updates);
-  return text;
-}
-
 TrackerResult track(FrameSource& source, const TrackerOptions& options) {
-  validate(options);
+  options.validate();
   return Run(&source, options).execute();
 }
 

@@ -78,6 +78,9 @@ struct TrackerOptions {
 
   /// Called after every frame; returning false stops the run (the report says interrupted).
   std::function<bool(const FrameCounts&, int frames_processed, int frames_asked)> progress;
+
+  /// Throws InputError naming the option, its value and what is expected.
+  void validate() const;
 };
 
 enum class TrackerEnd {
