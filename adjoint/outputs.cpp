@@ -15,7 +15,8 @@ PointInterpolation::PointInterpolation(const SkinMesh& mesh, std::vector<Materia
     const auto nodes = p.outer ? mesh.outer_nodes(p.face) : mesh.inner_nodes(p.face);
     nodes_.insert(nodes_.end(), nodes.begin(), nodes.end());
     rest_.row(k).setZero();
-    for (int i = 0; i < num_nodes_; ++i) rest_.row(k) += weights_[k * num_nodes_ + i] * mesh.rest.row(nodes[i]);
+    for (int i = 0; i < num_nodes_; ++i)
+      rest_.row(k) += weights_[k * num_nodes_ + i] * mesh.rest.row(nodes[i]);
   }
 }
 
@@ -41,20 +42,24 @@ void PointInterpolation::adjoint(int point, const Vec3& weight, VectorXd& u_bar)
 VectorXd PointPositions::values(int frame, const State& state) const {
   VectorXd out(size(frame));
   if (out.size() == 0) return out;
-  for (int k = 0; k < interpolation_.num_points(); ++k) out.segment<3>(3 * k) = interpolation_.position(k, state.u);
+  for (int k = 0; k < interpolation_.num_points(); ++k)
+    out.segment<3>(3 * k) = interpolation_.position(k, state.u);
   return out;
 }
 
 MatrixXd PointPositions::tangent(int frame, const State&, const MatrixXd& du, const MatrixXd&) const {
   MatrixXd out(size(frame), du.cols());
   if (out.rows() == 0) return out;
-  for (int k = 0; k < interpolation_.num_points(); ++k) out.middleRows(3 * k, 3) = interpolation_.tangent(k, du);
+  for (int k = 0; k < interpolation_.num_points(); ++k)
+    out.middleRows(3 * k, 3) = interpolation_.tangent(k, du);
   return out;
 }
 
-void PointPositions::adjoint(int frame, const State&, const VectorXd& weights, VectorXd& u_bar, VectorXd&) const {
+void PointPositions::adjoint(int frame, const State&, const VectorXd& weights, VectorXd& u_bar,
+                             VectorXd&) const {
   if (size(frame) == 0) return;
-  for (int k = 0; k < interpolation_.num_points(); ++k) interpolation_.adjoint(k, weights.segment<3>(3 * k), u_bar);
+  for (int k = 0; k < interpolation_.num_points(); ++k)
+    interpolation_.adjoint(k, weights.segment<3>(3 * k), u_bar);
 }
 
 }  // namespace rhytid::adjoint

@@ -1,7 +1,8 @@
 // What is differentiated: quantities read off the state at the end of a frame.
 //
-// To add one: derive from Output, give values, tangent and adjoint of one frame (they must pair: tests/adjoint checks
-// <J v, w> = <v, Jᵀ w> for every output), and pass it to the sweeps. Nothing else needs to know.
+// To add one: derive from Output, give values, tangent and adjoint of one frame (they must pair:
+// tests/adjoint checks <J v, w> = <v, Jᵀ w> for every output), and pass it to the sweeps. Nothing else needs
+// to know.
 #pragma once
 
 #include <vector>
@@ -21,7 +22,8 @@ class Output {
   /// Derivative along k directions: du [num_nodes·3][k], ds [history][k] → [size(frame)][k].
   virtual MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const = 0;
   /// Adds the transposed derivative applied to weights [size(frame)] to u_bar and s_bar.
-  virtual void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar, VectorXd& s_bar) const = 0;
+  virtual void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+                       VectorXd& s_bar) const = 0;
 };
 
 /// A point fixed to the skin: a place on the inner or outer surface in natural coordinates of a face.
@@ -49,8 +51,8 @@ class PointInterpolation {
  private:
   std::vector<MaterialPoint> points_;
   int num_nodes_;
-  std::vector<int> nodes_;        ///< [points][num_nodes_]
-  std::vector<double> weights_;   ///< same shape
+  std::vector<int> nodes_;       ///< [points][num_nodes_]
+  std::vector<double> weights_;  ///< same shape
   MatrixX3 rest_;
 };
 
@@ -62,7 +64,8 @@ class PointPositions final : public Output {
   int size(int frame) const override { return frame >= first_frame_ ? 3 * interpolation_.num_points() : 0; }
   VectorXd values(int frame, const State& state) const override;
   MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const override;
-  void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar, VectorXd& s_bar) const override;
+  void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+               VectorXd& s_bar) const override;
   const PointInterpolation& interpolation() const { return interpolation_; }
 
  private:

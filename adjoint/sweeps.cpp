@@ -23,7 +23,8 @@ void factor_step(StepProblem& problem, const StepRecord& record, BlockMatrix& ma
   const VectorXd q = problem.model().to_unknowns(record.state.u);
   problem.hessian(q, Curvature::raw, matrix);
   if (!factor.factorize(matrix))
-    throw GradientError("step " + std::to_string(record.step.index) + " (t = " + std::to_string(record.step.t) +
+    throw GradientError("step " + std::to_string(record.step.index) +
+                        " (t = " + std::to_string(record.step.t) +
                         " s): the Hessian at the converged state is not positive definite");
   report.smallest_pivot.push_back(factor.smallest_pivot());
   report.largest_pivot.push_back(factor.largest_pivot());
@@ -32,12 +33,14 @@ void factor_step(StepProblem& problem, const StepRecord& record, BlockMatrix& ma
   if (residual) *residual = r;
 }
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace
 
-TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Trajectory& run, const Output& output,
-                            const MatrixXd& directions) {
+TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Trajectory& run,
+                            const Output& output, const MatrixXd& directions) {
   check_run(run);
   require(directions.rows() == native.size(), "tangent_sweep: one row per native parameter");
   const double start = now();
@@ -96,8 +99,8 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
   return result;
 }
 
-AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Trajectory& run, const Output& output,
-                            const std::vector<VectorXd>& weights) {
+AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Trajectory& run,
+                            const Output& output, const std::vector<VectorXd>& weights) {
   check_run(run);
   require(static_cast<int>(weights.size()) == run.frames() + 1, "adjoint_sweep: weights for every frame");
   const double start = now();
@@ -118,16 +121,17 @@ AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Tr
     factor_step(problem, record, matrix, factor, result.report, &residual);
     VectorXd rhs = u_bar;
     for (std::size_t t = 0; t < model.terms.size(); ++t)
-      model.terms[t].adjoint_update(record.step, problem.data(t), record.state.u, s_bar.data() + model.history_offset(t),
-                                    rhs);
+      model.terms[t].adjoint_update(record.step, problem.data(t), record.state.u,
+                                    s_bar.data() + model.history_offset(t), rhs);
     const VectorXd adj_q = factor.solve(model.to_unknowns(rhs)).col(0);
     result.residual_error += adj_q.dot(residual);
     const VectorXd adj = model.to_displacement(adj_q);
     VectorXd u_old_bar = VectorXd::Zero(nu), s_old_bar = VectorXd::Zero(nh);
     for (std::size_t t = 0; t < model.terms.size(); ++t) {
       const std::size_t at = model.history_offset(t);
-      model.terms[t].adjoint_step(record.step, problem.data(t), record.state.u, old.u, old.history.data() + at, adj,
-                                  s_bar.data() + at, u_old_bar, s_old_bar.data() + at, result.native_bar);
+      model.terms[t].adjoint_step(record.step, problem.data(t), record.state.u, old.u,
+                                  old.history.data() + at, adj, s_bar.data() + at, u_old_bar,
+                                  s_old_bar.data() + at, result.native_bar);
     }
     u_bar = std::move(u_old_bar);
     s_bar = std::move(s_old_bar);

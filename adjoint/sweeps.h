@@ -1,12 +1,14 @@
 // Tangent and adjoint sweeps over a converged run. They only combine the blocks that the terms supply.
 //
 //   R_i(u_i; u_{i−1}, s_{i−1}, θ) = 0,   s_i = G(u_i; u_{i−1}, s_{i−1}, θ),   Q = Σ_f q_f(u, s at frame f)
-//   tangent  K_i du_i = −(R_θ dθ + R_{u−} du_{i−1} + R_{s−} ds_{i−1}),  ds_i = G_u du_i + G_{u−} du_{i−1} + G_{s−} ds_{i−1} + G_θ dθ
-//   adjoint  K_i adj = q_u + ū_i + G_uᵀ s̄_i ;  ū_{i−1} = −R_{u−}ᵀ adj + G_{u−}ᵀ s̄_i ;  s̄_{i−1} = q_s − R_{s−}ᵀ adj + G_{s−}ᵀ s̄_i ;
+//   tangent  K_i du_i = −(R_θ dθ + R_{u−} du_{i−1} + R_{s−} ds_{i−1}),  ds_i = G_u du_i + G_{u−} du_{i−1} +
+//   G_{s−} ds_{i−1} + G_θ dθ adjoint  K_i adj = q_u + ū_i + G_uᵀ s̄_i ;  ū_{i−1} = −R_{u−}ᵀ adj + G_{u−}ᵀ s̄_i
+//   ;  s̄_{i−1} = q_s − R_{s−}ᵀ adj + G_{s−}ᵀ s̄_i ;
 //            θ̄ += −R_θᵀ adj + G_θᵀ s̄_i
 //
-// K is the raw Hessian at the converged state. A run that is incomplete, kept no states or has a step whose Hessian does
-// not factor is refused (GradientError): the implicit function theorem does not hold there, a number would be wrong.
+// K is the raw Hessian at the converged state. A run that is incomplete, kept no states or has a step whose
+// Hessian does not factor is refused (GradientError): the implicit function theorem does not hold there, a
+// number would be wrong.
 //
 // Source   DESIGN section 4; model-notes "Suggested algebra".    Units  θ in native units (sim/time/model.h).
 // Tests    tests/adjoint
@@ -39,17 +41,18 @@ struct TangentResult {
   std::vector<MatrixXd> frames;
   SweepReport report;
 };
-TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Trajectory& run, const Output& output,
-                            const MatrixXd& directions);
+TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Trajectory& run,
+                            const Output& output, const MatrixXd& directions);
 
 /// Gradient of Σ_f weights_f · q_f by every native parameter at once.
 struct AdjointResult {
   VectorXd native_bar;  ///< [native size]
   SweepReport report;
-  /// adjᵀ R summed over steps: the first-order error of the functional from residuals that are not exactly zero.
+  /// adjᵀ R summed over steps: the first-order error of the functional from residuals that are not exactly
+  /// zero.
   double residual_error = 0;
 };
-AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Trajectory& run, const Output& output,
-                            const std::vector<VectorXd>& weights);
+AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Trajectory& run,
+                            const Output& output, const std::vector<VectorXd>& weights);
 
 }  // namespace rhytid::adjoint

@@ -1,5 +1,6 @@
 #include "sim/scene/scene_model.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,13 +23,22 @@ namespace rhytid {
 
 namespace {
 
-ThetaSlot constant_slot(int offset) { return {ThetaSlot::Kind::constant, offset, {}}; }
+ThetaSlot constant_slot(int offset) {
+  return {ThetaSlot::Kind::constant, offset, {}};
+}
 
-/// Instantaneous shear modulus and bulk modulus from Young's modulus and Poisson's ratio (paper.tex, eq. of μ and K).
-double shear_modulus(const LayerScene& l) { return l.youngs_modulus / (2 * (1 + l.poissons_ratio)); }
-double bulk_modulus(const LayerScene& l) { return l.youngs_modulus / (3 * (1 - 2 * l.poissons_ratio)); }
+/// Instantaneous shear modulus and bulk modulus from Young's modulus and Poisson's ratio (paper.tex, eq. of μ
+/// and K).
+double shear_modulus(const LayerScene& l) {
+  return l.youngs_modulus / (2 * (1 + l.poissons_ratio));
+}
+double bulk_modulus(const LayerScene& l) {
+  return l.youngs_modulus / (3 * (1 - 2 * l.poissons_ratio));
+}
 
-int default_degree(int wanted, int fallback) { return std::min(12, wanted > 0 ? wanted : fallback); }
+int default_degree(int wanted, int fallback) {
+  return std::min(12, wanted > 0 ? wanted : fallback);
+}
 
 GridPattern grid_pattern(const std::string& name) {
   if (name == "diagonal_plus") return GridPattern::diagonal_plus;
@@ -52,7 +62,8 @@ SceneModel::SceneModel(Scene scene) : scene_(std::move(scene)), heat_cache_(std:
     for (int face = 0; face < model_.mesh.num_faces; ++face)
       for (const auto& t : basis.subtriangles()) {
         std::array<int, 3> columns;
-        for (int k = 0; k < 3; ++k) columns[k] = model_.mesh.face_columns[static_cast<std::size_t>(face) * n + t[k]];
+        for (int k = 0; k < 3; ++k)
+          columns[k] = model_.mesh.face_columns[static_cast<std::size_t>(face) * n + t[k]];
         column_triangles_.push_back(columns);
       }
   }
@@ -130,14 +141,16 @@ void SceneModel::build_skin() {
   const auto relaxes = [&](int layer) {
     return skin.layers[layer].relaxing_fraction > 0 && scene_.time.damper != DamperScheme::none;
   };
-  // A layer without a Maxwell branch keeps no history and skips its logarithm; a term exists only if a layer needs it.
+  // A layer without a Maxwell branch keeps no history and skips its logarithm; a term exists only if a layer
+  // needs it.
   for (bool viscous : {true, false}) {
     Term term = viscous ? Term("skin", skin_kernels(), SkinLaw{scene_.time.damper})
                         : Term("skin (elastic)", elastic_skin_kernels(), ElasticSkinLaw{});
     for (int k = 0; k < static_cast<int>(model_.mesh.element_layers.size()); ++k)
       for (const MaterialSlab& slab : model_.mesh.element_layers[k].slabs) {
         if (relaxes(slab.material) != viscous) continue;
-        const int points = skin.thickness_points > 0 ? skin.thickness_points : model_.mesh.element_layers[k].order + 1;
+        const int points =
+            skin.thickness_points > 0 ? skin.thickness_points : model_.mesh.element_layers[k].order + 1;
         TermGroup g = prism_group(model_.mesh, k, slab, rule, points);
         const int base = model_.native_block("layer/" + skin.layers[slab.material].name).offset;
         for (int s = 0; s < term.kernels().ntheta; ++s) g.theta.push_back(constant_slot(base + s));
@@ -168,8 +181,8 @@ void SceneModel::build_ligaments() {
         local = it == from.end() ? -1 : static_cast<int>(it - from.begin());
       }
       if (local < 0 || local >= static_cast<int>(mesh.vertex_columns.size()))
-        throw InputError(scene_.file + ": /ligaments/sources/" + s.name + "/vertex", std::to_string(*s.vertex),
-                         "a vertex of the cropped surface");
+        throw InputError(scene_.file + ": /ligaments/sources/" + s.name + "/vertex",
+                         std::to_string(*s.vertex), "a vertex of the cropped surface");
       position = inner.row(mesh.vertex_columns[local]).transpose();
     }
     source_positions_.push_back(project_to_surface(inner, column_triangles_, position).point);
@@ -206,7 +219,8 @@ void SceneModel::build_contacts() {
     TermGroup g = surface_group(mesh, SkinSide::inner, rule);
     g.rest.clear();
     const int base = model_.native_block("ligaments").offset;
-    g.theta = {constant_slot(base), constant_slot(base + 1),
+    g.theta = {constant_slot(base),
+               constant_slot(base + 1),
                {ThetaSlot::Kind::field, model_.native_block("ligaments/b").offset, {}}};
     term.add_group(std::move(g));
     model_.terms.push_back(std::move(term));
@@ -214,8 +228,12 @@ void SceneModel::build_contacts() {
   if (scene_.base) {
     const BaseScene& b = *scene_.base;
     switch (b.shape) {
-      case ShapeKind::plane: model_.shapes.push_back(std::make_shared<Plane>(b.normal)); break;
-      case ShapeKind::sphere: model_.shapes.push_back(std::make_shared<Sphere>(b.radius)); break;
+      case ShapeKind::plane:
+        model_.shapes.push_back(std::make_shared<Plane>(b.normal));
+        break;
+      case ShapeKind::sphere:
+        model_.shapes.push_back(std::make_shared<Sphere>(b.radius));
+        break;
       case ShapeKind::imls: {
         MatrixX3 inner(mesh.num_columns, 3);
         for (int c = 0; c < mesh.num_columns; ++c) inner.row(c) = mesh.rest.row(mesh.node(c, 0));
@@ -242,7 +260,8 @@ void SceneModel::build_contacts() {
     term.add_group(std::move(g));
     model_.terms.push_back(std::move(term));
   }
-  features_.push_back({"base contact", scene_.base.has_value(), scene_.base ? "inner surface" : "no /base in the scene"});
+  features_.push_back(
+      {"base contact", scene_.base.has_value(), scene_.base ? "inner surface" : "no /base in the scene"});
   bool friction = false;
   for (const ColliderScene& c : scene_.colliders) {
     if (c.shape == ShapeKind::plane) {
@@ -265,9 +284,10 @@ void SceneModel::build_contacts() {
     }
     if (c.friction && c.friction->coefficient > 0) {
       friction = true;
-      Term term("friction " + c.name, friction_kernels(),
-                FrictionLaw{shape, c.onset, c.friction->slip_speed,
-                            c.friction->mollifier == "quadratic" ? Mollifier::quadratic : Mollifier::quintic});
+      Term term(
+          "friction " + c.name, friction_kernels(),
+          FrictionLaw{shape, c.onset, c.friction->slip_speed,
+                      c.friction->mollifier == "quadratic" ? Mollifier::quadratic : Mollifier::quintic});
       TermGroup g = surface_group(mesh, SkinSide::outer, rule);
       g.theta = {constant_slot(base), constant_slot(base + 1), constant_slot(base + 2)};
       for (ThetaSlot::Kind kind : {ThetaSlot::Kind::path_now, ThetaSlot::Kind::path_old})
@@ -277,8 +297,11 @@ void SceneModel::build_contacts() {
     }
   }
   const bool contact = !scene_.colliders.empty();
-  features_.push_back({"contact", contact, contact ? std::to_string(scene_.colliders.size()) + " colliders" : "no colliders"});
-  features_.push_back({"friction", friction, friction ? "lagged pressure and normal at every contact point" : "no collider has friction"});
+  features_.push_back({"contact", contact,
+                       contact ? std::to_string(scene_.colliders.size()) + " colliders" : "no colliders"});
+  features_.push_back(
+      {"friction", friction,
+       friction ? "lagged pressure and normal at every contact point" : "no collider has friction"});
 }
 
 void SceneModel::build_constraints() {
@@ -286,7 +309,8 @@ void SceneModel::build_constraints() {
   Constraints& c = model_.constraints;
   std::vector<int> rim_index(mesh.num_columns, -1);
   if (scene_.skin.rim != RimCondition::free)
-    for (std::size_t r = 0; r < mesh.rim_columns.size(); ++r) rim_index[mesh.rim_columns[r]] = static_cast<int>(r);
+    for (std::size_t r = 0; r < mesh.rim_columns.size(); ++r)
+      rim_index[mesh.rim_columns[r]] = static_cast<int>(r);
   c.block.assign(mesh.num_nodes(), -1);
   for (int column = 0; column < mesh.num_columns; ++column) {
     const int rim = rim_index[column];
@@ -349,7 +373,8 @@ VectorXd SceneModel::native(const Scene& scene) const {
 }
 
 VectorXd SceneModel::native_derivative(const Scene& scene, const std::string& address) const {
-  const ParameterSpec spec = describe_parameter(scene, address);  // canonical, by names; refuses unknown addresses
+  const ParameterSpec spec =
+      describe_parameter(scene, address);  // canonical, by names; refuses unknown addresses
   VectorXd d = VectorXd::Zero(model_.native.size());
   for (const LayerScene& l : scene.skin.layers) {
     const std::string prefix = "/skin/layers/" + l.name + "/";
@@ -414,7 +439,8 @@ VectorXd SceneModel::native_derivative(const Scene& scene, const std::string& ad
       return d;
     }
   }
-  throw InputError(scene.file + ": " + address, "a parameter without a derivative", "one of the fit-able parameters");
+  throw InputError(scene.file + ": " + address, "a parameter without a derivative",
+                   "one of the fit-able parameters");
 }
 
 }  // namespace rhytid

@@ -1,8 +1,9 @@
-// From a scene to a model: mesh, the terms the scene needs (and no others), native parameters; and the map between
-// scene parameters (addresses) and native ones.
+// From a scene to a model: mesh, the terms the scene needs (and no others), native parameters; and the map
+// between scene parameters (addresses) and native ones.
 //
-// Native parameters, in this order: per layer "layer/<name>": μ∞, C, K, μ_m, τ; "ligaments": k, ε; "ligaments/b": b per
-// column; "base": κ, inflation, centre [3]; per collider "collider/<name>": κ, inflation, μ, then its path knots [3] each.
+// Native parameters, in this order: per layer "layer/<name>": μ∞, C, K, μ_m, τ; "ligaments": k, ε;
+// "ligaments/b": b per column; "base": κ, inflation, centre [3]; per collider "collider/<name>": κ,
+// inflation, μ, then its path knots [3] each.
 #pragma once
 
 #include <memory>
@@ -37,7 +38,8 @@ class SceneModel {
   /// Native values of a scene that differs from the built one in fit-able parameters only (all_parameters).
   VectorXd native(const Scene& scene) const;
   VectorXd native() const { return model_.native; }
-  /// ∂native/∂p at `scene`, p at `address` in internal units. Throws InputError for an address that is not fit-able.
+  /// ∂native/∂p at `scene`, p at `address` in internal units. Throws InputError for an address that is not
+  /// fit-able.
   VectorXd native_derivative(const Scene& scene, const std::string& address) const;
 
   /// Ligament parameter b per column for a scene, 1/mm; empty without ligaments.

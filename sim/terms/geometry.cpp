@@ -1,5 +1,7 @@
 #include "sim/terms/geometry.h"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <string>

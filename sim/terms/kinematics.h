@@ -1,0 +1,110 @@
+// How a point sees the nodes of its element: strain of a prism point, displacement of a surface point.
+//
+//   prism    z = H = ∇u (9), e = Y = H + Hᵀ + HᵀH (6)        surface   z = e = u (3)
+//
+// Each kinematics gives e, ∂e/∂z, the geometric part σ·∂²e/∂z², and the change between natural and rest
+// directions. Source  paper.tex "Deformation Gradient", "Strain".  Tests  tests/sim/terms/point_term_test.cpp
+#pragma once
+
+#include <cstring>
+
+#include "sim/math/sym3.h"
+
+namespace rhytid {
+
+/// Directions that one tangent kernel call carries.
+inline constexpr int kDirections = 8;
+/// Rows of the table that one Hessian pass treats; a multiple of R.
+inline constexpr int kHessianRows = 24;
+
+/// Everything an element kernel reads, as plain pointers (see the shapes above; null where a law has none).
+struct ElementView {
+  int num_nodes, padded_nodes;     ///< n, npad (multiple of 8)
+  int num_points;                  ///< nq
+  int padded_rows;                 ///< length of a row of `rows_by_node`, ≥ nq·R, multiple of 8
+  const double* node_by_row;       ///< [nq·R][npad]
+  const double* rows_by_node;      ///< [n][padded_rows], the transpose
+  const double* inverse_jacobian;  ///< prisms: [nq][3][3] ∂ξ_r/∂X_I; surfaces: null
+  const double* weight;            ///< [nq] integration weight, mm³ or mm²
+  const double* rest;              ///< [nq][nrest]
+  const double* theta;             ///< [nq][ntheta], or one row when theta_stride = 0
+  int theta_stride;
+  double dt;  ///< s
+};
+
+inline namespace RHYTID_ISA {
+
+/// Kinematics of a prism point: z = H = ∇u (row-major a, I), e = Y = H + Hᵀ + HᵀH.
+struct PrismKinematics {
+  static constexpr int rows = 3, nz = 9, ne = 6;
+
+  static void strain(const double* h, double* y) {
+    for (int c = 0; c < 6; ++c) {
+      const int k = kSymRow[c], l = kSymCol[c];
+      y[c] = h[3 * k + l] + h[3 * l + k] + h[k] * h[l] + h[3 + k] * h[3 + l] + h[6 + k] * h[6 + l];
+    }
+  }
+  /// det F − 1 from H.
+  static double det_minus_one_of(const double* h) {
+    const double tr = h[0] + h[4] + h[8];
+    const double minors = h[0] * h[4] - h[1] * h[3] + h[0] * h[8] - h[2] * h[6] + h[4] * h[8] - h[5] * h[7];
+    const double det = h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) +
+                       h[2] * (h[3] * h[7] - h[4] * h[6]);
+    return tr + minors + det;
+  }
+  static bool feasible(const double* h) { return det_minus_one_of(h) > -1; }
+
+  /// ∂Y_c/∂H_aI = F_ak δ_lI + F_al δ_kI for c = (k, l).
+  static void strain_gradient(const double* h, double (*b)[9]) {
+    for (int c = 0; c < 6; ++c) {
+      const int k = kSymRow[c], l = kSymCol[c];
+      for (int z = 0; z < 9; ++z) b[c][z] = 0;
+      for (int a = 0; a < 3; ++a) {
+        b[c][3 * a + l] += h[3 * a + k] + (a == k);
+        b[c][3 * a + k] += h[3 * a + l] + (a == l);
+      }
+    }
+  }
+  /// Adds σ·∂²e/∂z²: δ_ab S_IJ.
+  static void add_geometric(const double* sigma, double (*a)[9]) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const double s = i == j ? 2 * sigma[i] : sigma[kSym[i][j]];
+        for (int c = 0; c < 3; ++c) a[3 * c + i][3 * c + j] += s;
+      }
+  }
+  /// z in natural directions (a, r) from nodal sums, and back: H_aI = Σ_r h_ar ∂ξ_r/∂X_I.
+  static void to_point(const double* natural, const double* ji, double* h) {
+    for (int a = 0; a < 3; ++a)
+      for (int i = 0; i < 3; ++i)
+        h[3 * a + i] =
+            natural[3 * a] * ji[i] + natural[3 * a + 1] * ji[3 + i] + natural[3 * a + 2] * ji[6 + i];
+  }
+  static void from_point(const double* p, const double* ji, double weight, double* natural) {
+    for (int a = 0; a < 3; ++a)
+      for (int r = 0; r < 3; ++r)
+        natural[3 * a + r] =
+            weight * (p[3 * a] * ji[3 * r] + p[3 * a + 1] * ji[3 * r + 1] + p[3 * a + 2] * ji[3 * r + 2]);
+  }
+};
+
+/// Kinematics of a surface point: e = z = u.
+struct SurfaceKinematics {
+  static constexpr int rows = 1, nz = 3, ne = 3;
+  static void strain(const double* u, double* e) { std::memcpy(e, u, 3 * sizeof(double)); }
+  static bool feasible(const double*) { return true; }
+  static void strain_gradient(const double*, double (*b)[3]) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) b[i][j] = i == j;
+  }
+  static void add_geometric(const double*, double (*)[3]) {}
+  static void to_point(const double* natural, const double*, double* u) {
+    std::memcpy(u, natural, 3 * sizeof(double));
+  }
+  static void from_point(const double* p, const double*, double weight, double* natural) {
+    for (int a = 0; a < 3; ++a) natural[a] = weight * p[a];
+  }
+};
+
+}  // namespace RHYTID_ISA
+}  // namespace rhytid
