@@ -1,12 +1,13 @@
-// A case: everything that one identification needs besides the scene. Read from case.json with the same strictness as
-// scenes (unknown key, wrong unit, out of range: one line, InputError).
+// A case: everything that one identification needs besides the scene. Read from case.json with the same
+// strictness as scenes (unknown key, wrong unit, out of range: one line, InputError).
 //
-//   case.json  { "name", "scene": "scene.json", "truth": {"scene": "truth.json", "settings": ["/pointer=value", ...]},
+//   case.json  { "name", "scene": "scene.json", "truth": {"scene": "truth.json", "settings":
+//   ["/pointer=value", ...]},
 //                "camera": "camera.yaml" | {...}, "footage": "footage.mp4", "tracks": "tracks.csv",
 //                "render": {...}, "track": {...}, "fit": {...} }
 //
-// Relative input paths are resolved against the case file; footage and tracks that do not exist there are looked for,
-// and written, in the output folder.
+// Relative input paths are resolved against the case file; footage and tracks that do not exist there are
+// looked for, and written, in the output folder.
 #pragma once
 
 #include <optional>
@@ -22,52 +23,54 @@ struct FitParameter {
   std::string address;
   std::optional<double> initial, lower, upper;  ///< internal units
   std::optional<ParameterTransform> transform;
-  std::optional<double> prior_sigma;            ///< standard deviation of a Gaussian prior in the transformed parameter
+  std::optional<double> prior_sigma;  ///< standard deviation of a Gaussian prior in the transformed parameter
 };
 
 struct RenderCase {
-  int width = 640, height = 480;       ///< px
-  int supersampling = 2;               ///< samples per pixel and axis
-  double noise = 1.0;                  ///< standard deviation of image noise, grey levels of 255
-  unsigned seed = 1;                   ///< of texture and noise
-  double texture_scale = 0.5;          ///< mm, typical size of skin marks
-  std::string codec = "mjpg";          ///< mjpg (avi) | h264 (mp4)
-  bool finger = true;                  ///< draw the colliders
+  int width = 640, height = 480;  ///< px
+  int supersampling = 2;          ///< samples per pixel and axis
+  double noise = 1.0;             ///< standard deviation of image noise, grey levels of 255
+  unsigned seed = 1;              ///< of texture and noise
+  double texture_scale = 0.5;     ///< mm, typical size of skin marks
+  std::string codec = "mjpg";     ///< mjpg (avi) | h264 (mp4)
+  bool finger = true;             ///< draw the colliders
 };
 
 struct TrackCase {
   int max_tracks = 300;
-  double min_distance = 8;             ///< px between tracks
+  double min_distance = 8;                   ///< px between tracks
   std::optional<std::array<double, 4>> roi;  ///< x, y, width, height, px
-  bool mask_finger = true;             ///< drop tracks that the projected colliders of the scene cover
+  bool mask_finger = true;                   ///< drop tracks that the projected colliders of the scene cover
 };
 
 struct FitCase {
   std::vector<FitParameter> parameters;
-  std::string optimiser = "ceres";     ///< ceres | nlopt
-  int max_evaluations = 30;            ///< forward runs
-  double robust_scale = 3;             ///< Huber threshold in standard deviations; 0 = plain least squares
-  double min_sigma = 0.05;             ///< px, floor of a track's standard deviation
-  int first_frame = 1, last_frame = 0; ///< frames used, 0 = all
-  double rim_margin = 1;               ///< mm: tracks closer to the rim of the patch are left out
-  /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden yardstick.
-  std::string gauge_layer;             ///< layer whose modulus is fixed; default: the innermost
+  std::string optimiser = "ceres";      ///< ceres | nlopt
+  int max_evaluations = 30;             ///< forward runs
+  double robust_scale = 3;              ///< Huber threshold in standard deviations; 0 = plain least squares
+  double min_sigma = 0.05;              ///< px, floor of a track's standard deviation
+  int first_frame = 1, last_frame = 0;  ///< frames used, 0 = all
+  double rim_margin = 1;                ///< mm: tracks closer to the rim of the patch are left out
+  /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden
+  /// yardstick.
+  std::string gauge_layer;  ///< layer whose modulus is fixed; default: the innermost
 };
 
 struct Case {
   std::string name, file;
-  std::string scene;                          ///< path of the scene that the fit uses
-  std::vector<std::string> scene_settings;    ///< "/pointer=value"
-  std::string truth_scene;                    ///< path; empty when the footage is real
+  std::string scene;                        ///< path of the scene that the fit uses
+  std::vector<std::string> scene_settings;  ///< "/pointer=value"
+  std::string truth_scene;                  ///< path; empty when the footage is real
   std::vector<std::string> truth_settings;
-  std::string camera;                         ///< path of the camera file
-  std::string footage, tracks;                ///< paths as given
+  std::string camera;           ///< path of the camera file
+  std::string footage, tracks;  ///< paths as given
   RenderCase render;
   TrackCase track;
   FitCase fit;
 };
 
-/// Reads and validates case.json; `settings` are "/pointer=value" overrides of the case itself. Throws InputError.
+/// Reads and validates case.json; `settings` are "/pointer=value" overrides of the case itself. Throws
+/// InputError.
 Case load_case(const std::string& path, const std::vector<std::string>& settings = {});
 
 }  // namespace rhytid::fitting

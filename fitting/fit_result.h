@@ -1,0 +1,69 @@
+// What a fit found: the one record from which the terminal answer, fit.json and report.html are made.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/core/types.h"
+
+namespace rhytid::fitting {
+
+struct FittedParameter {
+  std::string address, name, unit, transform;           ///< transform: none | log | logit
+  double initial = 0, value = 0, lower = 0, upper = 0;  ///< internal units
+  double sigma = 0;  ///< standard deviation in the transformed parameter (log: relative); NaN = undetermined
+  double low95 = 0, high95 = 0;  ///< 95 % interval in the parameter itself, internal units
+  bool at_bound = false, determined = true;
+  std::optional<double> truth;  ///< known in twin experiments
+};
+
+/// A quantity derived from the parameters, with its own interval (e.g. the modulus ratio of the layers).
+struct DerivedQuantity {
+  std::string name, unit;
+  double value = 0, low95 = 0, high95 = 0;
+  std::optional<double> truth;
+};
+
+struct FitIteration {
+  int iteration = 0, evaluations = 0;
+  double cost = 0, gradient_norm = 0, step_norm = 0, seconds = 0;
+  std::vector<double> values;  ///< of the parameters, internal units
+};
+
+/// One observation against the fitted prediction.
+struct FitResidual {
+  int frame = 0, track = 0;
+  double x_px = 0, y_px = 0;  ///< observed
+  double predicted_x_px = 0, predicted_y_px = 0;
+  double weight = 1;  ///< of the robust loss, 1 = full
+};
+
+struct FitResult {
+  std::string case_name, case_file, optimiser, status;  ///< status: converged | max_evaluations | failed: ...
+  bool converged = false;
+  std::vector<FittedParameter> parameters;
+  std::vector<DerivedQuantity> derived;
+  std::string gauge;  ///< sentence: what was held fixed and why
+  double initial_cost = 0, final_cost = 0;
+  int num_observations = 0, num_tracks = 0, tracks_left_out = 0, frames = 0;
+  double rms_px = 0;              ///< of the residuals
+  double reduced_chi_square = 0;  ///< 2·cost / degrees of freedom; intervals are widened by its root when > 1
+  int forward_runs = 0, jacobian_runs = 0;
+  double seconds = 0, forward_seconds = 0;  ///< whole fit; median forward run
+  std::vector<FitIteration> history;
+  VectorXd singular_values;              ///< of the whitened Jacobian by transformed parameters, descending
+  MatrixXd right_vectors;                ///< [parameters][parameters] columns belong to singular_values
+  MatrixXd correlation;                  ///< [parameters][parameters]
+  std::vector<std::string> cannot_tell;  ///< sentences: what the footage does not determine
+  std::vector<std::string> notes;        ///< schemes, settings, warnings
+  std::vector<FitResidual> residuals;
+  std::string scene_file, footage_file, tracks_file, camera_file;
+};
+
+/// fit.json (everything but residuals) and residuals.csv in `folder`; written atomically.
+void write_fit_result(const FitResult& result, const std::string& folder);
+/// Reads both back. Throws InputError.
+FitResult read_fit_result(const std::string& folder);
+
+}  // namespace rhytid::fitting
