@@ -41,18 +41,28 @@ Refusal judge(const Alignment& a, const Vec2& guess, double max_correction, cons
   return Refusal::none;
 }
 
-/// Aligns with the chosen model, then, if refused, with the deformation frozen: where texture is poor an
-/// affine warp has directions that nothing fixes. Returns the refusal of the last attempt.
+/// Aligns with the chosen model. The deformation is held as it was, and only the position sought, when
+/// texture does not fix it: when the affine alignment is refused, or makes the position much less certain
+/// (twice the variance) without explaining the picture better (10 % of the residual).
 Refusal try_align(const PatchTemplate& patch, const PatchWarp& start, double max_correction,
                   const FrameView& view, const TrackerOptions& o, double min_correlation, Alignment* result) {
-  Refusal refusal = Refusal::not_converged;
-  for (WarpModel model : {WarpModel::affine, WarpModel::translation}) {
-    if (model == WarpModel::affine && o.model == WarpModel::translation) continue;
+  constexpr double kCostly = 2, kBetter = 1.1;
+  const auto attempt = [&](WarpModel model, Alignment* a) {
     AlignmentOptions options;
     options.model = model;
-    *result = align(patch, *view.image, start, options);
-    refusal = judge(*result, start.centre, max_correction, view, o, min_correlation);
-    if (refusal == Refusal::none || refusal == Refusal::outside) break;
+    *a = align(patch, *view.image, start, options);
+    return judge(*a, start.centre, max_correction, view, o, min_correlation);
+  };
+  if (o.model == WarpModel::translation) return attempt(WarpModel::translation, result);
+  const Refusal refusal = attempt(WarpModel::affine, result);
+  if (refusal == Refusal::outside) return refusal;
+  if (refusal == Refusal::none && result->deformation_cost < kCostly) return refusal;
+  Alignment held;
+  const Refusal second = attempt(WarpModel::translation, &held);
+  const bool as_good = held.residual_rms <= kBetter * std::max(result->residual_rms, view.least_residual);
+  if (refusal != Refusal::none || (second == Refusal::none && as_good)) {
+    *result = std::move(held);
+    return second;
   }
   return refusal;
 }

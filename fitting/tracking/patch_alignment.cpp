@@ -249,6 +249,14 @@ Alignment align(const PatchTemplate& patch, const SplineImage& image, const Patc
   Mat8 inverse = Mat8::Zero();
   inverse.topLeftCorner(n, n) = normal.topLeftCorner(n, n).ldlt().solve(MatrixXd::Identity(n, n));
   finish(problem, p, inverse, cost, &out);
+  if (options.model == WarpModel::affine) {
+    // Information on c with A fixed: the lighting eliminated from the c block, A left out.
+    const Eigen::Matrix2d lighting = normal.block<2, 2>(6, 6);
+    const Eigen::Matrix2d cross = normal.block<2, 2>(0, 6);
+    const Eigen::Matrix2d held =
+        normal.topLeftCorner<2, 2>() - cross * lighting.inverse() * cross.transpose();
+    out.deformation_cost = std::max(1.0, (held * out.unit_covariance).eigenvalues().real().maxCoeff());
+  }
   return out;
 }
 

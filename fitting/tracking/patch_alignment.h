@@ -65,8 +65,10 @@ struct Alignment {
   double residual_rms = 0;  ///< σ, grey; degrees of freedom taken off
   double correlation = 0;   ///< zero-mean normalised, of I(W) and T
   int iterations = 0;
-  std::vector<float> residuals;     ///< r_i
-  Eigen::Matrix2Xd influence;       ///< G, shape [2][N], px per grey value
+  std::vector<float> residuals;  ///< r_i
+  Eigen::Matrix2Xd influence;    ///< G, shape [2][N], px per grey value
+  /// How much the free deformation costs: largest ratio of position variance to that with A held fixed, >= 1.
+  double deformation_cost = 1;
   Eigen::Matrix2d unit_covariance;  ///< G Gᵀ: covariance for white noise of unit variance
 };
 

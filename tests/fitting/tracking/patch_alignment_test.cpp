@@ -79,8 +79,12 @@ void check_covariance(double smoothing, double noise) {
   EXPECT_EQ(correlation.at(0, 0), 1);
 }
 
-TEST(PatchAlignment, CovarianceIsTheScatterForWhiteNoise) { check_covariance(0, 0.7); }
-TEST(PatchAlignment, CovarianceIsTheScatterForCorrelatedNoise) { check_covariance(1, 3); }
+TEST(PatchAlignment, CovarianceIsTheScatterForWhiteNoise) {
+  check_covariance(0, 0.7);
+}
+TEST(PatchAlignment, CovarianceIsTheScatterForCorrelatedNoise) {
+  check_covariance(1, 3);
+}
 
 TEST(PatchAlignment, SaysWhyItFailed) {
   const Speckle skin(kSize, kSize, 13);

