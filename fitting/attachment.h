@@ -1,5 +1,5 @@
 // Attaching tracks to skin: the pixel of a track in the first frame, cast onto the registered mesh, names the
-// material point that the track follows. Tests: tests/fitting/attachment_test.cpp
+// material point that the track follows. Tests: tests/fitting/raycast_test.cpp (Attachment)
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
 // Tracks drawn over the footage, coloured by their uncertainty.
-// Tests: tests/fitting/tracking/overlay_test.cpp
+// Tests: tests/fitting/tracking/frame_source_test.cpp (Overlay)
 #pragma once
 
 #include <string>

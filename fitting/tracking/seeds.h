@@ -1,5 +1,5 @@
 // Where to start tracks: corners spread over a region of interest, a regular grid, or given points.
-// Tests: tests/fitting/tracking/seeds_test.cpp
+// Tests: tests/fitting/tracking/frame_source_test.cpp (Seeds)
 #pragma once
 
 #include <opencv2/core.hpp>
