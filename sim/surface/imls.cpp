@@ -152,6 +152,13 @@ class ImlsSurface::Tree {
     index_.findNeighbors(result, x.data(), nanoflann::SearchParams());
   }
 
+  int nearest(const Vec3& x) const {
+    int found = 0;
+    double squared = 0;
+    index_.knnSearch(x.data(), 1, &found, &squared);
+    return found;
+  }
+
  private:
   MatrixX3 points_;
   PointCloud cloud_;
@@ -197,6 +204,11 @@ GapJet ImlsSurface::evaluate(const Vec3& x, JetOrder order) const {
   thread_local std::vector<int> found;  // scratch only: emptied by every search
   search(x, support_, &found);
   return sum(x, found, order);
+}
+
+bool ImlsSurface::behind(const Vec3& x) const {
+  const Sample& sample = samples_[static_cast<std::size_t>(tree_->nearest(x))];
+  return sample.normal.dot(x - sample.point) < 0;
 }
 
 ImlsSurface::Neighbours ImlsSurface::neighbours(const Vec3& x, double reach) const {

@@ -59,6 +59,8 @@ class ImlsSurface final : public ImplicitShape {
 
   GapJet evaluate(const Vec3& x) const override { return evaluate(x, JetOrder::hessian); }
   GapJet evaluate(const Vec3& x, JetOrder order) const;
+  /// True when x lies below the tangent plane of the nearest point.
+  bool behind(const Vec3& x) const override;
 
   /// Every point within h + reach of x (reach in mm, ≥ 0).
   Neighbours neighbours(const Vec3& x, double reach) const;

@@ -23,6 +23,9 @@ class ImplicitShape {
   /// ∂g/∂R for a shape whose size is one radius R; 0 for a shape without one. It does not depend on x, so
   /// ∂(∇g)/∂R = 0: changing the radius only offsets the level sets (sphere, capsule).
   virtual double gap_by_radius() const { return 0; }
+  /// For a point where evaluate() has no support: is it on the body's side, i.e. hopelessly deep? (The
+  /// contact law makes such a trial state infeasible instead of letting the skin fall through.)
+  virtual bool behind(const Vec3&) const { return false; }
 };
 
 }  // namespace rhytid

@@ -44,7 +44,7 @@ LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* x_local) {
   const GapJet jet = shape.evaluate(x0);
   LiftedGap<T> r;
   r.supported = jet.supported;
-  r.inside = !jet.supported && jet.gap < 0;
+  r.inside = !jet.supported && shape.behind(x0);
   const T dx[3] = {x_local[0] - x0[0], x_local[1] - x0[1], x_local[2] - x0[2]};
   r.gap = T(jet.gap) + dx[0] * jet.gradient[0] + dx[1] * jet.gradient[1] + dx[2] * jet.gradient[2];
   for (int i = 0; i < 3; ++i)

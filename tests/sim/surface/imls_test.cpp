@@ -205,6 +205,9 @@ TEST(Imls, SaysWhereItDoesNotExist) {
       EXPECT_EQ(jet.hessian, Mat3::Zero().eval());
     }
   }
+  // Which side such a point is on decides whether a trial state is refused or merely free of contact.
+  EXPECT_TRUE(surface.behind(Vec3(0, 0, 0.1)));
+  EXPECT_FALSE(surface.behind(Vec3(0, 0, 1.3)));
   // A single point in reach, up to the very edge of its support, gives its tangent plane.
   const MatrixX3 point = MatrixX3::Zero(1, 3);
   const MatrixX3 normal = Vec3::UnitZ().transpose();
