@@ -1,15 +1,19 @@
 // A case: everything that one identification needs besides the scene. Read from case.json with the same
-// strictness as scenes (unknown key, wrong unit, out of range: one line, InputError).
+// strictness as scenes (unknown key, wrong unit, out of range: one line, InputError); a case may extend
+// another.
 //
-//   case.json  { "name", "scene": "scene.json", "truth": {"scene": "truth.json", "settings":
-//   ["/pointer=value", ...]},
-//                "camera": "camera.yaml" | {...}, "footage": "footage.mp4", "tracks": "tracks.csv",
-//                "render": {...}, "track": {...}, "fit": {...} }
+//   case.json  { "name", "scene": "scene.json", "settings": ["/pointer=value", ...],
+//                "truth": {"scene": "truth.json", "settings": ["/pointer=value", ...]},
+//                "camera": "camera.yaml", "footage": "footage.mp4", "tracks": "tracks.csv",
+//                "render": {...}, "track": {...}, "fit": {"parameters": [{"address", ...}], ...} }
 //
+// A truth without a scene of its own is the fit's scene, settings included, changed by the truth's settings.
 // Relative input paths are resolved against the case file; footage and tracks that do not exist there are
-// looked for, and written, in the output folder.
+// looked for, and written, in the output folder. Tests: tests/fitting/case_test.cpp
 #pragma once
 
+#include <array>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,13 +31,15 @@ struct FitParameter {
 };
 
 struct RenderCase {
-  int width = 640, height = 480;  ///< px
-  int supersampling = 2;          ///< samples per pixel and axis
-  double noise = 1.0;             ///< standard deviation of image noise, grey levels of 255
-  unsigned seed = 1;              ///< of texture and noise
-  double texture_scale = 0.5;     ///< mm, typical size of skin marks
-  std::string codec = "mjpg";     ///< mjpg (avi) | h264 (mp4)
-  bool finger = true;             ///< draw the colliders
+  int width = 640, height = 480;              ///< px
+  int supersampling = 2;                      ///< samples per pixel and axis
+  double noise = 1.0;                         ///< standard deviation of image noise, grey levels of 255
+  unsigned seed = 1;                          ///< of texture and noise
+  double texture_scale = 0.5;                 ///< mm, typical size of skin marks
+  std::string codec = "mjpg";                 ///< mjpg (avi) | h264 (mp4)
+  bool finger = true;                         ///< draw the colliders
+  double tilt = 20 * std::numbers::pi / 180;  ///< rad, of the automatic camera off the mean normal
+  int truth_spacing = 16;                     ///< px between the material points of truth_tracks.csv
 };
 
 struct TrackCase {
@@ -62,15 +68,22 @@ struct Case {
   std::vector<std::string> scene_settings;  ///< "/pointer=value"
   std::string truth_scene;                  ///< path; empty when the footage is real
   std::vector<std::string> truth_settings;
-  std::string camera;           ///< path of the camera file
+  std::string camera;           ///< path of the camera file; empty: the automatic one of `render`
   std::string footage, tracks;  ///< paths as given
   RenderCase render;
   TrackCase track;
   FitCase fit;
 };
 
-/// Reads and validates case.json; `settings` are "/pointer=value" overrides of the case itself. Throws
-/// InputError.
+/// Reads and validates case.json; `settings` are "/pointer=value" overrides of the case itself. The scene is
+/// read too, since addresses and units of fitted parameters are checked against it. Throws InputError.
 Case load_case(const std::string& path, const std::vector<std::string>& settings = {});
+
+/// Where the footage, tracks and camera of a case are: the path given if it exists relative to the case file,
+/// else that file name in `folder` (footage.avi or .mp4, tracks.csv, camera.yaml when the case names none). A
+/// camera that the case names is never looked for elsewhere.
+std::string footage_path(const Case& c, const std::string& folder);
+std::string tracks_path(const Case& c, const std::string& folder);
+std::string camera_path(const Case& c, const std::string& folder);
 
 }  // namespace rhytid::fitting

@@ -37,7 +37,7 @@ class Merger {
  public:
   Merger(LocatedJson& target, const LocatedJson& patch) : target_(target), patch_(patch) {}
 
-  void run() { value(target_.json, "", patch_.json, "", &scene_rule_tree()); }
+  void run(const RuleNode& rules) { value(target_.json, "", patch_.json, "", &rules); }
 
  private:
   void value(json& into, const std::string& to, const json& patch, const std::string& from,
@@ -132,7 +132,7 @@ void resolve_paths(json& value, const RuleNode& node, const fs::path& folder) {
   }
 }
 
-LocatedJson read_file(const std::string& path, const std::string& mentioned_at,
+LocatedJson read_file(const std::string& path, const std::string& mentioned_at, const RuleNode& rules,
                       std::vector<fs::path>& chain) {
   std::error_code error;
   const fs::path identity = fs::weakly_canonical(path, error);
@@ -144,7 +144,7 @@ LocatedJson read_file(const std::string& path, const std::string& mentioned_at,
   LocatedJson own = parse_located(read_text(path, mentioned_at), path);
   if (!own.json.is_object()) throw InputError(own.where(""), shown_json(own.json), "an object {...}");
   const fs::path folder = fs::path(path).parent_path();
-  resolve_paths(own.json, scene_rule_tree(), folder);
+  resolve_paths(own.json, rules, folder);
 
   LocatedJson result;
   if (own.json.contains("extends")) {
@@ -154,11 +154,11 @@ LocatedJson read_file(const std::string& path, const std::string& mentioned_at,
       throw InputError(where, shown_json(base), "the path of a scene file");
     own.json.erase("extends");
     forget(own, "/extends");
-    result = read_file(resolved(base.get<std::string>(), folder).string(), where, chain);
+    result = read_file(resolved(base.get<std::string>(), folder).string(), where, rules, chain);
   } else {
     result.json = json::object();
   }
-  merge(result, own);
+  merge(result, own, rules);
   result.origin[""] = own.where("");
   return result;
 }
@@ -186,16 +186,17 @@ size_t item_index(const json& list, const std::string& key, const std::string& w
 
 }  // namespace
 
-void merge(LocatedJson& target, const LocatedJson& patch) {
-  Merger(target, patch).run();
+void merge(LocatedJson& target, const LocatedJson& patch, const RuleNode& rules) {
+  Merger(target, patch).run(rules);
 }
 
-LocatedJson read_with_extends(const std::string& path) {
+LocatedJson read_with_extends(const std::string& path, const RuleNode& rules) {
   std::vector<fs::path> chain;
-  return read_file(path, "", chain);
+  return read_file(path, "", rules, chain);
 }
 
-void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file) {
+void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file,
+                    const RuleNode& rules) {
   const std::string where = "--set " + shown_json(assignment);
   const size_t equals = assignment.find('=');
   if (equals == std::string::npos) throw InputError(where, "no '='", "pointer=value");
@@ -213,7 +214,7 @@ void apply_override(LocatedJson& target, const std::string& assignment, const st
   }
 
   json* node = &target.json;
-  const RuleNode* rule = &scene_rule_tree();
+  const RuleNode* rule = &rules;
   std::string pointer;
   for (size_t i = 0; i < keys.size(); ++i) {
     std::string key = keys[i];

@@ -13,6 +13,8 @@
 #include <string_view>
 #include <vector>
 
+#include "sim/scene/rules.h"
+
 namespace rhytid {
 
 struct LocatedJson {
@@ -42,15 +44,16 @@ int find_named(const nlohmann::json& list, std::string_view name);
 /// numbers beyond double range and nesting deeper than 64.
 LocatedJson parse_located(std::string_view text, const std::string& file);
 
-/// Merges `patch` into `target` as described above.
-void merge(LocatedJson& target, const LocatedJson& patch);
+/// Merges `patch` into `target` as described above; `rules` say which lists have named items.
+void merge(LocatedJson& target, const LocatedJson& patch, const RuleNode& rules = scene_rule_tree());
 
 /// Reads a file, makes paths in it absolute, and merges it into the file that it extends, and so on.
 /// Throws InputError when a file cannot be read, is malformed or extends itself.
-LocatedJson read_with_extends(const std::string& path);
+LocatedJson read_with_extends(const std::string& path, const RuleNode& rules = scene_rule_tree());
 
 /// Applies "pointer=value": value is JSON or, failing that, a string ("4 MPa"); null removes the value. List
 /// items are addressed by number or by name; missing objects on the way are created.
-void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file);
+void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file,
+                    const RuleNode& rules = scene_rule_tree());
 
 }  // namespace rhytid

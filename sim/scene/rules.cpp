@@ -67,12 +67,14 @@ bool RuleNode::is_named_list() const {
   return item != nullptr && item->child("name") != nullptr;
 }
 
+RuleNode build_rule_tree(const std::vector<Rule>& rules) {
+  RuleNode root;
+  for (const Rule& rule : rules) insert(root, rule);
+  return root;
+}
+
 const RuleNode& scene_rule_tree() {
-  static const RuleNode root = [] {
-    RuleNode node;
-    for (const Rule& rule : scene_rules()) insert(node, rule);
-    return node;
-  }();
+  static const RuleNode root = build_rule_tree(scene_rules());
   return root;
 }
 
@@ -114,6 +116,8 @@ std::string expectation(const Rule& rule) {
     case RuleType::number:
       if (is_plain) return "a number" + range;
       return dimension_text(rule.dimension) + range + ", e.g. \"" + dimension_example(rule.dimension) + "\"";
+    case RuleType::quantity:
+      return "a number, or a string with a unit, e.g. \"20 kPa\"";
     case RuleType::integer:
       return "an integer" + range;
     case RuleType::string:

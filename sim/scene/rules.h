@@ -1,5 +1,6 @@
 // The one table of what a scene file may say. Validation, defaults, the JSON Schema and the documentation are
-// all computed from it; adding a key means one row here and one line in fields.h.
+// all computed from it; adding a key means one row here and one line in fields.h. Other files (cases) bring a
+// table of their own to the same machinery.
 #pragma once
 
 #include <limits>
@@ -14,8 +15,9 @@ namespace rhytid {
 enum class RuleType {
   object,
   array,
-  number,   ///< a finite number, or a string with a unit of the right dimension
-  integer,  ///< 3 and 3.0, not 3.5
+  number,    ///< a finite number, or a string with a unit of the right dimension
+  quantity,  ///< the same of any dimension; who reads it checks, since it depends on other values
+  integer,   ///< 3 and 3.0, not 3.5
   string,
   name,  ///< of a list item: not empty, not only digits, without / ~ = and control characters
   path,  ///< of a file, resolved against the file that mentions it
@@ -56,6 +58,8 @@ struct RuleNode {
   /// Whether this is an array whose items have names, so that an address may use them in place of numbers.
   bool is_named_list() const;
 };
+/// The tree of a table, parents before children. The rules must outlive it.
+RuleNode build_rule_tree(const std::vector<Rule>& rules);
 const RuleNode& scene_rule_tree();
 
 /// The rule for a pattern such as "/skin/layers/*/thickness", or null.

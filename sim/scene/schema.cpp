@@ -94,6 +94,9 @@ json node_schema(const RuleNode& node, bool is_patch) {
     case RuleType::number:
       schema = number_schema(rule);
       break;
+    case RuleType::quantity:
+      schema = {{"type", json::array({"number", "string"})}};
+      break;
     case RuleType::integer:
       schema = integer_schema(rule);
       break;

@@ -54,6 +54,10 @@ class Resolver {
         return array(node, value, place);
       case RuleType::number:
         return number(rule, value, place);
+      case RuleType::quantity:
+        if (!value.is_number() && !value.is_string()) refuse(rule, value, place);
+        if (value.is_string()) parse_quantity(value.get_ref<const std::string&>(), where(place));
+        return value;
       case RuleType::integer:
         return integer(rule, value, place);
       case RuleType::boolean:
@@ -203,9 +207,9 @@ void require_direction(const LocatedJson& scene, const json& holder, const std::
 
 }  // namespace
 
-LocatedJson resolve_against_rules(const LocatedJson& scene) {
+LocatedJson resolve_against_rules(const LocatedJson& scene, const RuleNode& rules) {
   const Resolver resolver(scene);
-  return {.json = resolver.resolve(scene_rule_tree(), scene.json, Place{}), .origin = scene.origin};
+  return {.json = resolver.resolve(rules, scene.json, Place{}), .origin = scene.origin};
 }
 
 void check_consistency(const LocatedJson& scene) {

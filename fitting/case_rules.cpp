@@ -1,0 +1,157 @@
+#include "fitting/case_rules.h"
+
+#include "fitting/case.h"
+
+namespace rhytid::fitting {
+namespace {
+
+std::vector<Rule> file_rules() {
+  return {
+      {.pointer = "", .type = RuleType::object, .is_required = true, .doc = "A case."},
+      {.pointer = "/$schema", .type = RuleType::string, .doc = "For editors; ignored."},
+      {.pointer = "/name", .type = RuleType::string, .fallback = "", .doc = "Short name of the case."},
+      {.pointer = "/description", .type = RuleType::string, .doc = "What it shows; ignored."},
+      {.pointer = "/scene", .type = RuleType::path, .is_required = true, .doc = "Scene that the fit runs."},
+      {.pointer = "/settings",
+       .type = RuleType::array,
+       .fallback = nlohmann::json::array(),
+       .doc = "Changes of that scene, \"/pointer=value\"."},
+      {.pointer = "/settings/*", .type = RuleType::string},
+      {.pointer = "/truth", .type = RuleType::object, .doc = "What made the footage of a twin experiment."},
+      {.pointer = "/truth/scene", .type = RuleType::path, .doc = "Scene; default: that of the fit."},
+      {.pointer = "/truth/settings",
+       .type = RuleType::array,
+       .fallback = nlohmann::json::array(),
+       .doc = "Changes of the truth's scene."},
+      {.pointer = "/truth/settings/*", .type = RuleType::string},
+      {.pointer = "/camera", .type = RuleType::path, .doc = "OpenCV camera; default: the automatic one."},
+      {.pointer = "/footage", .type = RuleType::string, .fallback = "", .doc = "Video file."},
+      {.pointer = "/tracks", .type = RuleType::string, .fallback = "", .doc = "Observations, CSV."},
+  };
+}
+
+std::vector<Rule> render_rules() {
+  const RenderCase c;
+  return {
+      {.pointer = "/render", .type = RuleType::object, .fallback = nlohmann::json::object()},
+      {.pointer = "/render/width",
+       .type = RuleType::integer,
+       .fallback = c.width,
+       .min = 32,
+       .max = 8192,
+       .doc = "Of the automatic camera, px."},
+      {.pointer = "/render/height", .type = RuleType::integer, .fallback = c.height, .min = 32, .max = 8192},
+      {.pointer = "/render/supersampling",
+       .type = RuleType::integer,
+       .fallback = c.supersampling,
+       .min = 1,
+       .max = 8},
+      {.pointer = "/render/noise",
+       .fallback = c.noise,
+       .min = 0,
+       .max = 64,
+       .doc = "Standard deviation, grey levels of 255."},
+      {.pointer = "/render/seed", .type = RuleType::integer, .fallback = c.seed, .min = 0, .max = 2147483647},
+      {.pointer = "/render/texture_scale",
+       .dimension = dimension::length,
+       .fallback = c.texture_scale,
+       .min = 0,
+       .min_is_open = true,
+       .doc = "Typical size of skin marks."},
+      {.pointer = "/render/codec",
+       .type = RuleType::option,
+       .fallback = c.codec,
+       .options = {"mjpg", "h264"}},
+      {.pointer = "/render/finger", .type = RuleType::boolean, .fallback = c.finger},
+      {.pointer = "/render/tilt",
+       .dimension = dimension::angle,
+       .fallback = c.tilt,
+       .min = 0,
+       .max = 1.4,
+       .doc = "Of the automatic camera off the mean normal."},
+      {.pointer = "/render/truth_spacing",
+       .type = RuleType::integer,
+       .fallback = c.truth_spacing,
+       .min = 1,
+       .max = 1000,
+       .doc = "Pixels between the material points of truth_tracks.csv."},
+  };
+}
+
+std::vector<Rule> track_rules() {
+  const TrackCase c;
+  return {
+      {.pointer = "/track", .type = RuleType::object, .fallback = nlohmann::json::object()},
+      {.pointer = "/track/max_tracks",
+       .type = RuleType::integer,
+       .fallback = c.max_tracks,
+       .min = 1,
+       .max = 100000},
+      {.pointer = "/track/min_distance",
+       .fallback = c.min_distance,
+       .min = 1,
+       .max = 1000,
+       .doc = "Between tracks, px."},
+      {.pointer = "/track/roi",
+       .type = RuleType::array,
+       .min = 4,
+       .max = 4,
+       .doc = "x, y, width, height in px."},
+      {.pointer = "/track/roi/*", .min = 0, .max = 1e5},
+      {.pointer = "/track/mask_finger", .type = RuleType::boolean, .fallback = c.mask_finger},
+  };
+}
+
+std::vector<Rule> fit_rules() {
+  const FitCase c;
+  const std::string item = "/fit/parameters/*";
+  return {
+      {.pointer = "/fit", .type = RuleType::object, .fallback = nlohmann::json::object()},
+      {.pointer = "/fit/parameters", .type = RuleType::array, .fallback = nlohmann::json::array()},
+      {.pointer = item, .type = RuleType::object},
+      {.pointer = item + "/address", .type = RuleType::string, .is_required = true},
+      {.pointer = item + "/initial", .type = RuleType::quantity},
+      {.pointer = item + "/lower", .type = RuleType::quantity},
+      {.pointer = item + "/upper", .type = RuleType::quantity},
+      {.pointer = item + "/transform", .type = RuleType::option, .options = {"none", "log", "logit"}},
+      {.pointer = item + "/prior_sigma", .min = 0, .min_is_open = true},
+      {.pointer = "/fit/optimiser",
+       .type = RuleType::option,
+       .fallback = c.optimiser,
+       .options = {"ceres", "nlopt"}},
+      {.pointer = "/fit/max_evaluations",
+       .type = RuleType::integer,
+       .fallback = c.max_evaluations,
+       .min = 1,
+       .max = 1000000},
+      {.pointer = "/fit/robust_scale", .fallback = c.robust_scale, .min = 0},
+      {.pointer = "/fit/min_sigma", .fallback = c.min_sigma, .min = 0, .min_is_open = true},
+      {.pointer = "/fit/first_frame",
+       .type = RuleType::integer,
+       .fallback = c.first_frame,
+       .min = 1,
+       .max = 1000000},
+      {.pointer = "/fit/last_frame",
+       .type = RuleType::integer,
+       .fallback = c.last_frame,
+       .min = 0,
+       .max = 1000000},
+      {.pointer = "/fit/rim_margin", .dimension = dimension::length, .fallback = c.rim_margin, .min = 0},
+      {.pointer = "/fit/gauge_layer", .type = RuleType::string, .fallback = c.gauge_layer},
+  };
+}
+
+}  // namespace
+
+const RuleNode& case_rule_tree() {
+  static const std::vector<Rule> rules = [] {
+    std::vector<Rule> all;
+    for (std::vector<Rule> (*group)() : {&file_rules, &render_rules, &track_rules, &fit_rules})
+      for (Rule& rule : group()) all.push_back(std::move(rule));
+    return all;
+  }();
+  static const RuleNode root = build_rule_tree(rules);
+  return root;
+}
+
+}  // namespace rhytid::fitting

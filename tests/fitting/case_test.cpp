@@ -1,0 +1,136 @@
+// Case files: what they say arrives, and what is wrong is refused in one line that names place and remedy.
+#include "fitting/case.h"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "sim/core/error.h"
+#include "tests/support/small_scenes.h"
+
+namespace rhytid::fitting {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+class CaseTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("rhytid_case_" + std::to_string(getpid()) + "_" +
+               testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::create_directories(folder_);
+    write("scene.json", test::drag_scene(2, 3));
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  std::string error_of(const std::string& text, const std::vector<std::string>& settings = {}) {
+    try {
+      load_case(write("case.json", text), settings);
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+      return error.what();
+    }
+    return "no error";
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(CaseTest, DefaultsAreThoseOfTheStructs) {
+  const Case c = load_case(write("case.json", R"({"scene": "scene.json"})"));
+  EXPECT_EQ(c.name, "drag");
+  EXPECT_EQ(c.scene, (folder_ / "scene.json").string());
+  EXPECT_EQ(c.truth_scene, "");
+  EXPECT_EQ(c.render.width, RenderCase().width);
+  EXPECT_EQ(c.render.noise, RenderCase().noise);
+  EXPECT_EQ(c.track.max_tracks, TrackCase().max_tracks);
+  EXPECT_FALSE(c.track.roi);
+  EXPECT_EQ(c.fit.max_evaluations, FitCase().max_evaluations);
+  EXPECT_EQ(c.fit.min_sigma, FitCase().min_sigma);
+  EXPECT_TRUE(c.fit.parameters.empty());
+}
+
+TEST_F(CaseTest, QuantitiesTakeTheUnitOfTheirParameter) {
+  const Case c = load_case(write("case.json", R"({
+    "scene": "scene.json", "settings": ["/time/frames=2"],
+    "truth": {"settings": ["/skin/layers/film/youngs_modulus=2 MPa"]},
+    "render": {"texture_scale": "300 um", "tilt": "0 deg"},
+    "track": {"roi": [1, 2, 30, 40]},
+    "fit": {"rim_margin": "1 cm", "gauge_layer": "film", "parameters": [
+      {"address": "/skin/layers/1/youngs_modulus", "initial": "500 kPa", "lower": "1 kPa", "upper": 3,
+       "transform": "logit", "prior_sigma": 0.7},
+      {"address": "/colliders/finger/friction/coefficient", "initial": 0.3}]}})"));
+  ASSERT_EQ(c.fit.parameters.size(), 2u);
+  const FitParameter& film = c.fit.parameters[0];
+  EXPECT_EQ(film.address, "/skin/layers/film/youngs_modulus");
+  EXPECT_EQ(film.initial, 0.5);
+  EXPECT_EQ(film.lower, 0.001);
+  EXPECT_EQ(film.upper, 3.0);
+  EXPECT_EQ(film.transform, ParameterTransform::logit);
+  EXPECT_EQ(film.prior_sigma, 0.7);
+  EXPECT_FALSE(c.fit.parameters[1].lower);
+  EXPECT_EQ(c.fit.rim_margin, 10);
+  EXPECT_EQ(c.render.texture_scale, 0.3);
+  EXPECT_EQ(c.render.tilt, 0);
+  EXPECT_EQ(c.track.roi, (std::array<double, 4>{1, 2, 30, 40}));
+  EXPECT_EQ(c.truth_scene, c.scene);
+  EXPECT_THAT(c.truth_settings,
+              testing::ElementsAre("/time/frames=2", "/skin/layers/film/youngs_modulus=2 MPa"));
+}
+
+TEST_F(CaseTest, WrongCasesAreRefusedWithPlaceAndRemedy) {
+  EXPECT_THAT(error_of(R"({"scene": "scene.json", "rendr": {}})"),
+              AllOf(HasSubstr("case.json:1: /rendr"), HasSubstr("nearest is \"render\"")));
+  EXPECT_THAT(error_of("{\"scene\": \"scene.json\",\n\"render\": {\"noise\": -1}}"),
+              AllOf(HasSubstr("case.json:2: /render/noise: got -1"), HasSubstr("from 0 to 64")));
+  EXPECT_THAT(error_of(R"({})"), AllOf(HasSubstr("/scene"), HasSubstr("required")));
+  EXPECT_THAT(error_of(R"({"scene": "absent.json"})"), HasSubstr("absent.json"));
+  EXPECT_THAT(error_of(R"({"scene": "scene.json", "track": {"roi": [1, 2, 3]}})"), HasSubstr("/track/roi"));
+  const auto parameter = [this](const std::string& text) {
+    return error_of("{\"scene\": \"scene.json\", \"fit\": {\"parameters\": [" + text + "]}}");
+  };
+  EXPECT_THAT(parameter(R"({"address": "/skin/layers/film/youngs_modulu"})"),
+              AllOf(HasSubstr("/fit/parameters/0/address"),
+                    HasSubstr("nearest is /skin/layers/film/youngs_modulus")));
+  EXPECT_THAT(parameter(R"({"address": "/skin/layers/film/youngs_modulus", "initial": "3 mm"})"),
+              AllOf(HasSubstr("/fit/parameters/0/initial"), HasSubstr("a pressure")));
+  EXPECT_THAT(parameter(R"({"address": "/skin/layers/film/youngs_modulus", "lower": "2 MPa"})"),
+              AllOf(HasSubstr("/fit/parameters/0/initial"), HasSubstr("the scene's value")));
+  EXPECT_THAT(parameter(R"({"address": "/skin/layers/film/youngs_modulus", "lower": 5, "upper": 4})"),
+              HasSubstr("lower < upper"));
+  EXPECT_THAT(parameter(R"({"address": "/skin/layers/film/youngs_modulus"},
+                           {"address": "/skin/layers/1/youngs_modulus"})"),
+              AllOf(HasSubstr("/fit/parameters/1/address"), HasSubstr("a second time")));
+  EXPECT_THAT(error_of(R"({"scene": "scene.json", "fit": {"gauge_layer": "flim"}})"),
+              HasSubstr("nearest is \"film\""));
+}
+
+TEST_F(CaseTest, OverridesAndExtends) {
+  write("base.json", R"({"scene": "scene.json", "render": {"noise": 3, "seed": 4}})");
+  const std::string path = write("case.json", R"({"extends": "base.json", "render": {"noise": 2}})");
+  const Case c = load_case(path, {"/render/seed=9"});
+  EXPECT_EQ(c.render.noise, 2);
+  EXPECT_EQ(c.render.seed, 9u);
+  EXPECT_THAT(error_of(R"({"scene": "scene.json"})", {"/render/sed=9"}), HasSubstr("\"seed\""));
+}
+
+TEST_F(CaseTest, FilesAreLookedForBesideTheCaseThenInTheFolder) {
+  Case c = load_case(write("case.json", R"({"scene": "scene.json", "footage": "f.mp4"})"));
+  EXPECT_EQ(footage_path(c, "out"), "out/f.mp4");
+  EXPECT_EQ(tracks_path(c, "out"), "out/tracks.csv");
+  EXPECT_EQ(camera_path(c, "out"), "out/camera.yaml");
+  write("f.mp4", "");
+  EXPECT_EQ(footage_path(c, "out"), (folder_ / "f.mp4").string());
+}
+
+}  // namespace
+}  // namespace rhytid::fitting
