@@ -1,0 +1,56 @@
+// Footage of a moving skin: textured, lit from the side, with the finger, its shadow, and camera noise.
+//
+//   colour = albedo · (ambient · occlusion + key · shadow · wrapped cosine) + a weak gloss,
+// summed in linear light over the samples of a pixel, encoded as sRGB, then noise of the given deviation in
+// grey levels. Everything random is a hash of seed, frame and place, so that a frame is the same bits
+// whatever the number of threads.
+#pragma once
+
+#include <vector>
+
+#include "fitting/cameras.h"
+#include "fitting/case.h"
+#include "sim/output/image.h"
+#include "sim/output/raster.h"
+#include "sim/scene/scene.h"
+#include "tools/render/finger.h"
+#include "tools/render/moving_surface.h"
+#include "tools/render/skin_texture.h"
+
+namespace rhytid::tools {
+
+/// Subdivision of the faces so that sub-triangles are about `edge_px` long in the picture; 1..48.
+int subdivision_for(const MovingSurface& surface, const fitting::Camera& camera, double edge_px);
+
+class SkinRenderer {
+ public:
+  /// All four must outlive the renderer; `tessellation` is the surface's own, `scene` gives the colliders.
+  SkinRenderer(const MovingSurface& surface, const SubdividedSurface& tessellation, const Scene& scene,
+               const fitting::Camera& camera, const fitting::RenderCase& options);
+
+  /// The picture at the end of a frame of the surface, RGB.
+  Image render(int frame) const;
+
+ private:
+  struct Lit;
+  VisibilityBuffer visibility(const MatrixX3& positions) const;
+  Vec3 sample(const Lit& lit, size_t index, const Vec2& pixel) const;
+  Vec3 skin_colour(const Lit& lit, size_t index) const;
+  Vec3 finger_colour(const Lit& lit, const Finger& finger, const Vec3& point) const;
+  Vec3 background(const Vec2& pixel) const;
+  Vec3 shaded(const Vec3& albedo, const Vec3& point, const Vec3& normal, double ambient_occlusion,
+              double shadow, double gloss) const;
+  Vec2 normalised(const Vec2& pixel, size_t index) const;
+
+  const MovingSurface& surface_;
+  const SubdividedSurface& tessellation_;
+  const Scene& scene_;
+  const fitting::Camera& camera_;
+  fitting::RenderCase options_;
+  SkinTexture texture_, finger_texture_;
+  MatrixX3 rest_;
+  Vec3 up_, light_, finger_direction_, eye_;
+  std::vector<Vec2> undistorted_;  ///< per sample, only for a camera with distortion
+};
+
+}  // namespace rhytid::tools

@@ -1,0 +1,137 @@
+// rhytid render: a case's truth, simulated and filmed, with exact ground truth beside the footage.
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <ostream>
+
+#include "fitting/cameras.h"
+#include "fitting/case.h"
+#include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
+#include "sim/scene/load.h"
+#include "tools/render/footage.h"
+#include "tools/render/skin_camera.h"
+#include "tools/render/skin_renderer.h"
+#include "tools/render/truth.h"
+#include "tools/render/twin_run.h"
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Footage is always written into the folder, never over the file that a case names elsewhere.
+std::string footage_in(const fitting::Case& c, const std::string& folder) {
+  const fs::path named = fs::path(c.footage).filename();
+  if (!named.empty()) return (fs::path(folder) / named).string();
+  return (fs::path(folder) / (c.render.codec == "h264" ? "footage.mp4" : "footage.avi")).string();
+}
+
+class Render : public Verb {
+ public:
+  VerbHelp help() const override {
+    return {
+        "render",
+        "simulate the truth of a case and film it",
+        "Runs the truth's scene of a case (the fit's scene when it names none) and renders what a camera "
+        "would "
+        "see: textured skin, the finger, noise. Beside the footage stands the exact ground truth, so that "
+        "tracking and fitting can be judged. Use it for twin experiments: can the parameters be found again?",
+        "case.json, its scenes and camera",
+        "footage.avi or .mp4, frame_*.png (first, middle, last), camera.yaml, truth_tracks.csv, truth.json, "
+        "truth_motion.bin",
+        "rhytid render data/cases/twin/case.json -o run/twin"};
+  }
+  void add_options(CLI::App& app) override {
+    app.add_flag("--keep-motion", keep_motion_,
+                 "film the truth_motion.bin that is in the folder, if it is of the same scene, instead of "
+                 "simulating again");
+  }
+
+  ExitCode run(VerbContext& context) override {
+    const fitting::Case c = fitting::load_case(context.options.file, context.options.settings);
+    const Scene fit = load_scene(c.scene, c.scene_settings);
+    const SceneModel truth(truth_scene(c));
+    const int stride = frame_stride(fit, truth.scene());
+    const std::string folder = context.output_folder();
+    const auto in_folder = [&folder](const char* name) { return (fs::path(folder) / name).string(); };
+
+    TwinRun twin = motion(context, truth, stride, in_folder("truth_motion.bin"));
+    if (context.progress.interrupted()) return ExitCode::interrupted;
+    write_motion(twin.surface, in_folder("truth_motion.bin"));
+    const fitting::Camera camera =
+        c.camera.empty() ? automatic_camera(twin.surface, c.render.width, c.render.height, c.render.tilt)
+                         : fitting::read_camera(c.camera);
+    fitting::write_camera(camera, in_folder("camera.yaml"));
+    write_file(in_folder("truth.json"),
+               truth_record(fit, truth, stride, twin.surface.frames()).dump(2) + "\n");
+    if (!film(context, c, truth.scene(), twin.surface, camera, folder)) return ExitCode::interrupted;
+    if (twin.complete) return ExitCode::ok;
+    context.progress.error("the truth's run ended early: " + twin.failure);
+    return ExitCode::not_converged;
+  }
+
+ private:
+  TwinRun motion(VerbContext& context, const SceneModel& truth, int stride, const std::string& path) const {
+    if (keep_motion_ && fs::exists(path)) {
+      TwinRun kept;
+      kept.surface = read_motion(path);
+      kept.complete = true;
+      const int frames = truth.scene().time.frames / stride + 1;
+      if (kept.surface.scene == scene_to_json(truth.scene()).dump() && kept.surface.frames() == frames)
+        return kept;
+      context.progress.note("truth_motion.bin is of another scene or incomplete; simulating again");
+    }
+    return run_twin(truth, stride, context.progress);
+  }
+
+  /// False when interrupted.
+  static bool film(VerbContext& context, const fitting::Case& c, const Scene& truth,
+                   const MovingSurface& surface, const fitting::Camera& camera, const std::string& folder) {
+    const SubdividedSurface tessellation(surface.mesh, SurfaceSide::outer,
+                                         subdivision_for(surface, camera, 3));
+    const SkinRenderer renderer(surface, tessellation, truth, camera, c.render);
+    const Vec3 direction = finger_direction(surface.mean_normal(), camera);
+    TruthTracker tracker(surface, tessellation, camera, c.render.truth_spacing);
+    const std::string path = footage_in(c, folder);
+    const int frames = surface.frames();
+    const double rate = frames > 1 ? (frames - 1) / surface.times.back() : truth.time.frame_rate;
+    FootageWriter footage(path, c.render.codec, rate, camera.width, camera.height);
+    context.progress.stage("render", frames);
+    double seconds = 0;
+    for (int frame = 0; frame < frames; ++frame) {
+      const auto begin = std::chrono::steady_clock::now();
+      const Image image = renderer.render(frame);
+      seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      footage.add(image);
+      if (frame == 0 || frame == frames / 2 || frame == frames - 1) {
+        char name[32];
+        std::snprintf(name, sizeof(name), "frame_%04d.png", frame);
+        write_png((fs::path(folder) / name).string(), image);
+      }
+      const double time = surface.times[static_cast<size_t>(frame)];
+      tracker.add_frame(frame, c.render.finger ? fingers_at(truth, time, direction) : std::vector<Finger>());
+      context.progress.step_done(frame + 1);
+      if (context.progress.interrupted()) return false;
+    }
+    footage.commit();
+    fitting::write_tracks(tracker.tracks(), (fs::path(folder) / "truth_tracks.csv").string());
+    char text[160];
+    std::snprintf(text, sizeof(text), "%d frames at %g Hz, %d x %d px, %.2f s a frame; %zu exact tracks",
+                  frames, rate, camera.width, camera.height, seconds / frames, tracker.points().size());
+    context.out << path << ": " << text << '\n';
+    return true;
+  }
+
+  bool keep_motion_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Verb> make_verb_render() {
+  return std::make_unique<Render>();
+}
+
+}  // namespace rhytid::tools
