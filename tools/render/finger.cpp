@@ -68,7 +68,7 @@ std::vector<Finger> fingers_at(const Scene& scene, double time, const Vec3& dire
   for (const ColliderScene& collider : scene.colliders) {
     if (collider.shape != ShapeKind::sphere) continue;
     const Vec3 tip = path_position(collider.path, time);
-    fingers.push_back({tip, tip + 4 * collider.radius * direction, collider.radius});
+    fingers.push_back({tip, tip + 1.2 * collider.radius * direction, collider.radius});
   }
   return fingers;
 }

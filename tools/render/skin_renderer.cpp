@@ -88,7 +88,7 @@ SkinRenderer::SkinRenderer(const MovingSurface& surface, const SubdividedSurface
       camera_(camera),
       options_(options),
       texture_(options.texture_scale, footprint(surface, camera, options.supersampling), options.seed),
-      finger_texture_(0.8, footprint(surface, camera, options.supersampling), options.seed + 1),
+      finger_texture_(0.3, footprint(surface, camera, options.supersampling), options.seed + 1),
       rest_(tessellation.positions({})),
       up_(surface.mean_normal()),
       finger_direction_(finger_direction(up_, camera)),
