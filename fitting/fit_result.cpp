@@ -1,0 +1,345 @@
+#include "fitting/fit_result.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string_view>
+#include <type_traits>
+
+#include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
+#include "sim/output/csv.h"
+
+namespace rhytid::fitting {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* format_name = "rhytid fit 1";
+
+// Each record lists its fields once; the same list writes and reads.
+template <class Archive, class Record>
+void parameter_fields(Archive& field, Record& p) {
+  field("address", p.address);
+  field("name", p.name);
+  field("unit", p.unit);
+  field("transform", p.transform);
+  field("initial", p.initial);
+  field("value", p.value);
+  field("lower", p.lower);
+  field("upper", p.upper);
+  field("sigma", p.sigma);
+  field("low95", p.low95);
+  field("high95", p.high95);
+  field("at_bound", p.at_bound);
+  field("determined", p.determined);
+  field("truth", p.truth);
+}
+
+template <class Archive, class Record>
+void derived_fields(Archive& field, Record& d) {
+  field("name", d.name);
+  field("unit", d.unit);
+  field("value", d.value);
+  field("low95", d.low95);
+  field("high95", d.high95);
+  field("truth", d.truth);
+}
+
+template <class Archive, class Record>
+void iteration_fields(Archive& field, Record& i) {
+  field("iteration", i.iteration);
+  field("evaluations", i.evaluations);
+  field("cost", i.cost);
+  field("gradient_norm", i.gradient_norm);
+  field("step_norm", i.step_norm);
+  field("seconds", i.seconds);
+  field("values", i.values);
+}
+
+template <class Archive, class Record>
+void result_fields(Archive& field, Record& r) {
+  field("case_name", r.case_name);
+  field("case_file", r.case_file);
+  field("optimiser", r.optimiser);
+  field("status", r.status);
+  field("converged", r.converged);
+  field("parameters", r.parameters);
+  field("derived", r.derived);
+  field("gauge", r.gauge);
+  field("cannot_tell", r.cannot_tell);
+  field("initial_cost", r.initial_cost);
+  field("final_cost", r.final_cost);
+  field("num_observations", r.num_observations);
+  field("num_tracks", r.num_tracks);
+  field("tracks_left_out", r.tracks_left_out);
+  field("frames", r.frames);
+  field("rms_px", r.rms_px);
+  field("reduced_chi_square", r.reduced_chi_square);
+  field("forward_runs", r.forward_runs);
+  field("jacobian_runs", r.jacobian_runs);
+  field("seconds", r.seconds);
+  field("forward_seconds", r.forward_seconds);
+  field("history", r.history);
+  field("singular_values", r.singular_values);
+  field("right_vectors", r.right_vectors);
+  field("correlation", r.correlation);
+  field("notes", r.notes);
+  field("scene_file", r.scene_file);
+  field("footage_file", r.footage_file);
+  field("tracks_file", r.tracks_file);
+  field("camera_file", r.camera_file);
+}
+
+/// JSON has no NaN and no infinity: null and the words "inf", "-inf" stand for them.
+Json number(double value) {
+  if (std::isnan(value)) return nullptr;
+  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+  return value;
+}
+
+class Writer {
+ public:
+  Json out = Json::object();
+
+  template <class T>
+  void operator()(const char* key, const T& value) {
+    out[key] = json(value);
+  }
+
+ private:
+  static Json json(const std::string& v) { return v; }
+  static Json json(bool v) { return v; }
+  static Json json(int v) { return v; }
+  static Json json(double v) { return number(v); }
+  /// A missing truth is absent, unlike a truth that is not a number.
+  static Json json(const std::optional<double>& v) { return v ? number(*v) : Json("unknown"); }
+  static Json json(const VectorXd& v) { return json(std::vector<double>(v.begin(), v.end())); }
+  static Json json(const MatrixXd& m) {
+    Json rows = Json::array();
+    for (Eigen::Index i = 0; i < m.rows(); ++i) rows.push_back(json(VectorXd(m.row(i).transpose())));
+    return rows;
+  }
+  static Json json(const FittedParameter& v) {
+    Writer w;
+    parameter_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const DerivedQuantity& v) {
+    Writer w;
+    derived_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const FitIteration& v) {
+    Writer w;
+    iteration_fields(w, v);
+    return std::move(w.out);
+  }
+  template <class T>
+  static Json json(const std::vector<T>& v) {
+    Json list = Json::array();
+    for (const T& item : v) list.push_back(json(item));
+    return list;
+  }
+};
+
+class Reader {
+ public:
+  Reader(const Json& in, std::string where) : in_(in), where_(std::move(where)) {
+    if (!in.is_object()) throw InputError(where_, in.dump(), "an object");
+  }
+
+  template <class T>
+  void operator()(const char* key, T& value) {
+    const std::string where = where_ + "/" + key;
+    const auto found = in_.find(key);
+    if (found == in_.end()) throw InputError(where, "nothing", "a value");
+    read(*found, value, where);
+  }
+
+ private:
+  static void read(const Json& j, std::string& v, const std::string& where) {
+    if (!j.is_string()) throw InputError(where, j.dump(), "a text");
+    v = j.get<std::string>();
+  }
+  static void read(const Json& j, bool& v, const std::string& where) {
+    if (!j.is_boolean()) throw InputError(where, j.dump(), "true or false");
+    v = j.get<bool>();
+  }
+  static void read(const Json& j, int& v, const std::string& where) {
+    const bool fits = j.is_number_integer() && j.get<double>() == static_cast<int>(j.get<double>());
+    if (!fits) throw InputError(where, j.dump(), "a whole number");
+    v = j.get<int>();
+  }
+  static void read(const Json& j, double& v, const std::string& where) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    if (j.is_null()) {
+      v = std::numeric_limits<double>::quiet_NaN();
+    } else if (j == "inf" || j == "-inf") {
+      v = j == "inf" ? infinity : -infinity;
+    } else if (j.is_number()) {
+      v = j.get<double>();
+    } else {
+      throw InputError(where, j.dump(), "a number, null, \"inf\" or \"-inf\"");
+    }
+  }
+  static void read(const Json& j, std::optional<double>& v, const std::string& where) {
+    v.reset();
+    if (j == "unknown") return;
+    double value = 0;
+    read(j, value, where);
+    v = value;
+  }
+  static void read(const Json& j, VectorXd& v, const std::string& where) {
+    std::vector<double> values;
+    read(j, values, where);
+    v = Eigen::Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  }
+  static void read(const Json& j, MatrixXd& m, const std::string& where) {
+    std::vector<VectorXd> rows;
+    read(j, rows, where);
+    m.resize(static_cast<Eigen::Index>(rows.size()), rows.empty() ? 0 : rows.front().size());
+    for (size_t i = 0; i < rows.size(); ++i) {
+      if (rows[i].size() != m.cols()) {
+        throw InputError(where + "/" + std::to_string(i), std::to_string(rows[i].size()) + " numbers",
+                         std::to_string(m.cols()));
+      }
+      m.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
+    }
+  }
+  static void read(const Json& j, FittedParameter& v, const std::string& where) {
+    Reader r(j, where);
+    parameter_fields(r, v);
+  }
+  static void read(const Json& j, DerivedQuantity& v, const std::string& where) {
+    Reader r(j, where);
+    derived_fields(r, v);
+  }
+  static void read(const Json& j, FitIteration& v, const std::string& where) {
+    Reader r(j, where);
+    iteration_fields(r, v);
+  }
+  template <class T>
+  static void read(const Json& j, std::vector<T>& v, const std::string& where) {
+    if (!j.is_array()) throw InputError(where, j.dump(), "a list");
+    v.assign(j.size(), T());
+    for (size_t i = 0; i < j.size(); ++i) read(j[i], v[i], where + "/" + std::to_string(i));
+  }
+
+  const Json& in_;
+  std::string where_;
+};
+
+/// Tables by parameter are empty (the fit ended before them) or fit the number of parameters.
+void check_sizes(const FitResult& result, const std::string& where) {
+  const auto n = static_cast<Eigen::Index>(result.parameters.size());
+  const auto check = [&](const char* key, Eigen::Index rows, Eigen::Index columns, Eigen::Index want) {
+    if ((rows == 0 && columns == 0) || (rows == n && columns == want)) return;
+    throw InputError(where + "/" + key, std::to_string(rows) + " × " + std::to_string(columns) + " numbers",
+                     std::to_string(n) + " × " + std::to_string(want) + " for as many parameters");
+  };
+  check("right_vectors", result.right_vectors.rows(), result.right_vectors.cols(), n);
+  check("correlation", result.correlation.rows(), result.correlation.cols(), n);
+  if (result.singular_values.size() > 0) check("singular_values", result.singular_values.size(), 1, 1);
+  for (size_t i = 0; i < result.history.size(); ++i) {
+    const auto size = static_cast<Eigen::Index>(result.history[i].values.size());
+    if (size > 0) check(("history/" + std::to_string(i) + "/values").c_str(), size, 1, 1);
+  }
+}
+
+const std::vector<CsvColumn>& residual_columns() {
+  static const std::vector<CsvColumn> columns = {
+      {"frame", ""},         {"track", ""},         {"x", "px"},    {"y", "px"},
+      {"predicted_x", "px"}, {"predicted_y", "px"}, {"weight", ""},
+  };
+  return columns;
+}
+
+std::string residual_text(const std::vector<FitResidual>& residuals) {
+  CsvTable table(residual_columns());
+  for (const FitResidual& r : residuals) {
+    table.add_row({std::int64_t{r.frame}, std::int64_t{r.track}, r.x_px, r.y_px, r.predicted_x_px,
+                   r.predicted_y_px, r.weight});
+  }
+  return table.text();
+}
+
+template <class Number>
+Number parse_cell(std::string_view cell, const std::string& where) {
+  Number value{};
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (error != std::errc() || end != cell.data() + cell.size()) {
+    throw InputError(where, "'" + std::string(cell) + "'",
+                     std::is_integral_v<Number> ? "a whole number" : "a number");
+  }
+  return value;
+}
+
+std::vector<FitResidual> parse_residuals(const std::string& text, const std::string& path) {
+  std::istringstream lines(text);
+  std::string line, header = CsvTable(residual_columns()).text();
+  header.pop_back();
+  if (!std::getline(lines, line) || line != header) throw InputError(path + ":1", "'" + line + "'", header);
+  std::vector<FitResidual> residuals;
+  for (int number = 2; std::getline(lines, line); ++number) {
+    const std::string where = path + ":" + std::to_string(number);
+    std::vector<std::string_view> cells;
+    for (std::string_view rest = line;;) {
+      const size_t comma = rest.find(',');
+      cells.push_back(rest.substr(0, comma));
+      if (comma == std::string_view::npos) break;
+      rest.remove_prefix(comma + 1);
+    }
+    if (cells.size() != residual_columns().size()) {
+      throw InputError(where, std::to_string(cells.size()) + " cells",
+                       std::to_string(residual_columns().size()));
+    }
+    const auto real = [&](size_t i) { return parse_cell<double>(cells[i], where); };
+    residuals.push_back({parse_cell<int>(cells[0], where), parse_cell<int>(cells[1], where), real(2), real(3),
+                         real(4), real(5), real(6)});
+  }
+  return residuals;
+}
+
+}  // namespace
+
+void write_fit_result(const FitResult& result, const std::string& folder) {
+  Writer writer;
+  writer("format", std::string(format_name));
+  result_fields(writer, result);
+  writer("num_residuals", static_cast<int>(result.residuals.size()));
+  // fit.json comes last: where it is, residuals.csv is complete.
+  write_file(folder + "/residuals.csv", residual_text(result.residuals));
+  write_file(folder + "/fit.json", writer.out.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+FitResult read_fit_result(const std::string& folder) {
+  const std::string path = folder + "/fit.json";
+  Json json;
+  try {
+    json = Json::parse(read_file(path));
+  } catch (const Json::exception& e) {
+    throw InputError(path + ": not readable as JSON: " + e.what());
+  }
+  FitResult result;
+  Reader reader(json, path + ":");
+  std::string format;
+  reader("format", format);
+  if (format != format_name) throw InputError(path + ":/format", format, format_name);
+  result_fields(reader, result);
+  check_sizes(result, path + ":");
+  const std::string csv = folder + "/residuals.csv";
+  result.residuals = parse_residuals(read_file(csv), csv);
+  int num_residuals = 0;
+  reader("num_residuals", num_residuals);
+  if (num_residuals != static_cast<int>(result.residuals.size())) {
+    throw InputError(csv, std::to_string(result.residuals.size()) + " rows",
+                     std::to_string(num_residuals) + ", as fit.json of the same fit says");
+  }
+  return result;
+}
+
+}  // namespace rhytid::fitting

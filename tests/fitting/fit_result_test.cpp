@@ -1,0 +1,150 @@
+// The record of a fit comes back from its files bit for bit, and damaged files are refused.
+#include "fitting/fit_result.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
+
+namespace rhytid::fitting {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+std::string fresh_folder(const std::string& name) {
+  const std::string folder = testing::TempDir() + "/rhytid_fit_result_" + name;
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  return folder;
+}
+
+FitResult example() {
+  FitResult r;
+  r.case_name = "drag \"quoted\" <b> µ";
+  r.optimiser = "ceres";
+  r.status = "converged";
+  r.converged = true;
+  r.parameters.resize(2);
+  r.parameters[0] = {"/a/b",    "film E", "MPa", "log", 0.1,  1. / 3, 1e-300,
+                     0.1 + 0.2, 1e-17,    0.3,   0.35,  true, true,   0.34};
+  r.parameters[1] = {"/c",     "b of left", "1/mm",    "none",    5,     nan_value, -infinity,
+                     infinity, nan_value,   nan_value, nan_value, false, false,     {}};
+  r.derived = {{"ratio", "", 50.25, 40, 60.125, {}}, {"nothing", "mm", nan_value, 0, 0, nan_value}};
+  r.gauge = "held";
+  r.initial_cost = 1e5 / 7;
+  r.num_observations = 12345;
+  r.history = {{0, 1, 10, 1, 0, 0.5, {1, 2}}, {1, 3, 1. / 7, 1e-3, 0.2, 1.5, {1.1, nan_value}}};
+  r.singular_values = VectorXd::LinSpaced(2, 3.3, 0.1);
+  r.right_vectors = MatrixXd::Identity(2, 2);
+  r.right_vectors(0, 1) = -0.25;
+  r.correlation = MatrixXd::Identity(2, 2);
+  r.cannot_tell = {"the modulus alone", "line\nbreak"};
+  r.notes = {"seed 1"};
+  r.residuals = {{3, 7, 1. / 3, 2, 0.1 + 0.2, nan_value, 1}, {4, 7, 1, 2, -3, 4, 0.5}};
+  r.tracks_file = "tracks.csv";
+  return r;
+}
+
+bool same(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
+
+TEST(FitResult, ReadsBackBitForBit) {
+  const std::string folder = fresh_folder("round_trip");
+  const FitResult r = example();
+  write_fit_result(r, folder);
+  const FitResult s = read_fit_result(folder);
+  EXPECT_EQ(s.case_name, r.case_name);
+  EXPECT_EQ(s.status, r.status);
+  EXPECT_TRUE(s.converged);
+  ASSERT_EQ(s.parameters.size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    const FittedParameter &p = r.parameters[i], &q = s.parameters[i];
+    EXPECT_EQ(q.address, p.address);
+    EXPECT_EQ(q.transform, p.transform);
+    EXPECT_TRUE(same(q.value, p.value) && same(q.lower, p.lower) && same(q.upper, p.upper)) << i;
+    EXPECT_TRUE(same(q.sigma, p.sigma) && same(q.low95, p.low95) && same(q.high95, p.high95)) << i;
+    EXPECT_EQ(q.at_bound, p.at_bound);
+    EXPECT_EQ(q.determined, p.determined);
+    EXPECT_EQ(q.truth, p.truth);
+  }
+  EXPECT_FALSE(s.derived[0].truth.has_value());
+  ASSERT_TRUE(s.derived[1].truth.has_value());  // known to be not a number is not the same as unknown
+  EXPECT_TRUE(std::isnan(*s.derived[1].truth));
+  EXPECT_EQ(s.initial_cost, r.initial_cost);
+  EXPECT_EQ(s.num_observations, 12345);
+  EXPECT_EQ(s.history[1].cost, 1. / 7);
+  EXPECT_TRUE(std::isnan(s.history[1].values[1]));
+  EXPECT_EQ(s.singular_values, r.singular_values);
+  EXPECT_EQ(s.right_vectors, r.right_vectors);
+  EXPECT_EQ(s.cannot_tell, r.cannot_tell);
+  ASSERT_EQ(s.residuals.size(), 2u);
+  EXPECT_EQ(s.residuals[0].x_px, 1. / 3);
+  EXPECT_EQ(s.residuals[0].predicted_x_px, 0.1 + 0.2);
+  EXPECT_TRUE(std::isnan(s.residuals[0].predicted_y_px));
+  EXPECT_EQ(s.residuals[1].track, 7);
+  EXPECT_EQ(s.residuals[1].weight, 0.5);
+
+  // The second trip writes the same bytes: nothing was lost that the checks above do not look at.
+  const std::string again = fresh_folder("round_trip_again");
+  write_fit_result(s, again);
+  for (const char* name : {"/fit.json", "/residuals.csv"}) {
+    EXPECT_EQ(read_file(again + name), read_file(folder + name));
+  }
+}
+
+TEST(FitResult, HeadersCarryUnits) {
+  const std::string folder = fresh_folder("units");
+  write_fit_result(example(), folder);
+  const std::string csv = read_file(folder + "/residuals.csv");
+  EXPECT_EQ(csv.substr(0, csv.find('\n')), "frame,track,x_px,y_px,predicted_x_px,predicted_y_px,weight");
+}
+
+TEST(FitResult, AnEmptyResultIsAllowed) {
+  const std::string folder = fresh_folder("empty");
+  write_fit_result({}, folder);
+  const FitResult s = read_fit_result(folder);
+  EXPECT_TRUE(s.parameters.empty());
+  EXPECT_EQ(s.correlation.size(), 0);
+}
+
+std::string message_after(const std::string& file, const std::string& from, const std::string& to) {
+  const std::string folder = fresh_folder("damage");
+  write_fit_result(example(), folder);
+  std::string text = read_file(folder + file);
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  write_file(folder + file, text.replace(at, from.size(), to));
+  try {
+    read_fit_result(folder);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+TEST(FitResult, DamagedFilesAreRefusedByName) {
+  EXPECT_THAT(message_after("/fit.json", "rhytid fit 1", "other"), HasSubstr("fit.json:/format"));
+  EXPECT_THAT(message_after("/fit.json", "\"num_tracks\": 0", "\"num_tracks\": 0.5"),
+              HasSubstr("/num_tracks"));
+  EXPECT_THAT(message_after("/fit.json", "\"gauge\"", "\"gouge\""), HasSubstr("/gauge"));
+  EXPECT_THAT(message_after("/fit.json", "\"unit\": \"MPa\"", "\"unit\": 3"),
+              HasSubstr("/parameters/0/unit"));
+  EXPECT_THAT(message_after("/fit.json", "{", "["), HasSubstr("not readable as JSON"));
+  EXPECT_THAT(message_after("/fit.json", "\"num_residuals\": 2", "\"num_residuals\": 3"),
+              HasSubstr("residuals.csv"));
+  EXPECT_THAT(message_after("/residuals.csv", "weight", "weigh"), HasSubstr("residuals.csv:1"));
+  EXPECT_THAT(message_after("/residuals.csv", "4,7,1", "4,7,one"), HasSubstr("residuals.csv:3"));
+  EXPECT_THROW(read_fit_result(fresh_folder("missing")), InputError);
+}
+
+}  // namespace
+}  // namespace rhytid::fitting
