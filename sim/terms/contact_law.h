@@ -159,6 +159,7 @@ struct FrictionLaw {
     (void)ContactLaw::penalty(theta[0], depth, onset, slope);
     const T length =
         sqrt(g.gradient[0] * g.gradient[0] + g.gradient[1] * g.gradient[1] + g.gradient[2] * g.gradient[2]);
+    if (!(value_of(length) > 0)) return;  // the centre of a sphere: no direction, hence no friction
     lag[0] = slope * length;
     for (int i = 0; i < 3; ++i) lag[1 + i] = g.gradient[i] / length;
   }

@@ -4,13 +4,14 @@
 //   during it         energy  weight · ψ_m(trial)
 //   after it          C^v ← C^v #_post C̄
 //
-//   exponential    β = (1−α)/r:  pre 1 − α/β, weight β, post 1 − β   second order, exact at constant rate
-//   (default) literal        pre 0, weight α, post 1 − α                       first order, as printed in the
-//   publication strang         pre 1 − √α, weight √α, post 1 − √α                second order backward_euler
-//   pre 0, weight 1/(1+r), post r/(1+r)               first order
+//   scheme          pre        weight   post
+//   exponential     1 − α/β    β        1 − β     default: second order, exact at constant rate; β = (1−α)/r
+//   literal         0          α        1 − α     first order, as printed in the publication
+//   strang          1 − √α     √α       1 − √α    second order
+//   backward_euler  0          1/(1+r)  r/(1+r)   first order
 //
 // Source   paper.tex "Viscous Time Integration"; DESIGN section 2.
-// Tests    tests/sim/terms/skin_law_test.cpp (DamperOrder)
+// Tests    tests/sim/terms/skin_law_test.cpp (DamperOrder), law_edges_test.cpp (DamperNumbers)
 #pragma once
 
 #include <cmath>
@@ -34,12 +35,13 @@ Damper<T> damper(DamperScheme scheme, const T& tau, double dt) {
   const T r = dt / tau;
   switch (scheme) {
     case DamperScheme::exponential: {
-      // β = −expm1(−r)/r; 1 − β and 1 − α/β by series where they would cancel.
+      // β = −expm1(−r)/r. For small r, 1 − β by its series and 1 − α/β = r − (1 − β)/β, since α = 1 − r β:
+      // all digits are kept down to r = 0 (the first term left out is r⁸/9!, 7e-20 at the switch).
       if (value_of(r) < 0.02) {
-        const T half = r * 0.5;
-        const T post = half * (1.0 - r / 3.0 * (1.0 - r / 4.0 * (1.0 - r / 5.0 * (1.0 - r / 6.0))));
-        const T beta = 1.0 - post;
-        return {1.0 - (1.0 + expm1(-r)) / beta, beta, post};
+        T series = 1.0 - r / 8.0;
+        for (int k = 7; k >= 3; --k) series = 1.0 - r * (1.0 / k) * series;
+        const T post = r * 0.5 * series, beta = 1.0 - post;
+        return {r - post / beta, beta, post};
       }
       const T beta = -expm1(-r) / r;
       return {1.0 - exp(-r) / beta, beta, 1.0 - beta};

@@ -1,0 +1,143 @@
+// Whole terms on a small curved patch with random states: two element layers, shared nodes, every kind of parameter slot.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "law_cases.h"
+#include "sim/core/error.h"
+#include "sim/element/quadrature.h"
+#include "sim/mesh/skin_mesh.h"
+#include "sim/terms/geometry.h"
+#include "sim/terms/term.h"
+
+namespace rhytid {
+extern const KernelTable skin_table_baseline, elastic_table_baseline, skin_table_avx2, elastic_table_avx2;
+}
+
+namespace rhytid::test {
+
+/// 2 × 1 mm, two faces, bent, bottom and top nodes moved at random: truly curved elements.
+inline SkinMesh curved_patch(int order, int thickness_order, Rng& rng) {
+  ExtrusionOptions o;
+  o.order = order;
+  o.layers = {{0.5, 1, thickness_order}, {0.2, 1, 1}};
+  o.bend_radius = 4;
+  SkinMesh mesh = extrude(grid_surface(2, 1, 1, 1, GridPattern::diagonal_plus), o);
+  std::uniform_real_distribution<double> d(-0.03 / (order * order), 0.03 / (order * order));
+  for (Eigen::Index i = 0; i < mesh.rest.rows(); ++i)
+    for (int a = 0; a < 3; ++a) mesh.rest(i, a) += d(rng);
+  return mesh;
+}
+
+/// A term with an old state, a state, and native parameters.
+struct TermCase {
+  std::string name;
+  SkinMesh mesh;
+  std::vector<Term> terms;  ///< one; a vector because a Term has no default
+  std::shared_ptr<const ImplicitShape> shape;
+  VectorXd native, native_scale;
+  StepInfo step{3, 0.10, 0.14};
+  VectorXd u_old, u, history;
+  const Term& term() const { return terms.front(); }
+};
+
+inline VectorXd smooth_displacement(const SkinMesh& mesh, Rng& rng, double amount) {
+  const VectorXd c = uniform(rng, 18, amount);
+  VectorXd u(3 * mesh.num_nodes());
+  for (int i = 0; i < mesh.num_nodes(); ++i) {
+    const Vec3 x = mesh.rest.row(i).transpose();
+    for (int a = 0; a < 3; ++a)
+      u[3 * i + a] = c[6 * a] * x[0] + c[6 * a + 1] * x[1] + c[6 * a + 2] * x[2] + c[6 * a + 3] * x[0] * x[1] +
+                     c[6 * a + 4] * x[0] * x[0] + c[6 * a + 5] * x[1] * x[2];
+  }
+  return u + uniform(rng, static_cast<int>(u.size()), 0.02 * amount / (mesh.order * mesh.order));
+}
+
+inline TermCase skin_case(const KernelTable& kernels, bool viscous, DamperScheme scheme, int order,
+                          int thickness_order, double amount = 0.2) {
+  Rng rng(21);
+  TermCase c{viscous ? "skin" : "elastic skin", curved_patch(order, thickness_order, rng), {}, {}, {}, {}, {}, {}, {}, {}};
+  c.terms.push_back(viscous ? Term("skin", kernels, SkinLaw{scheme}) : Term("elastic", kernels, ElasticSkinLaw{}));
+  for (int layer = 0; layer < 2; ++layer) {
+    const ElementLayer& e = c.mesh.element_layers[layer];
+    TermGroup g = prism_group(c.mesh, layer, e.slabs.front(), triangle_rule(std::min(12, 2 * order + 2)), e.order + 1);
+    for (int s = 0; s < kernels.ntheta; ++s) g.theta.push_back({ThetaSlot::Kind::constant, 5 * layer + s, {}});
+    c.terms.front().add_group(std::move(g));
+  }
+  c.native = VectorXd(10);
+  c.native << 0.2, 1.3, 5, 0.8, 0.09, 2, 0.7, 40, 6, 0.05;
+  c.native_scale = c.native;
+  c.u_old = smooth_displacement(c.mesh, rng, amount);
+  c.u = c.u_old + smooth_displacement(c.mesh, rng, amount);
+  c.history.resize(static_cast<Eigen::Index>(c.term().history_size()));
+  for (Eigen::Index k = 0; 6 * k < c.history.size(); ++k) c.history.segment<6>(6 * k) = random_strain(rng, amount);
+  return c;
+}
+
+/// Contact, friction or ligaments; parameters by constants, a field and a path with a knot inside the step.
+inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice, int order,
+                             Mollifier mollifier = Mollifier::quintic) {
+  Rng rng(22);
+  TermCase c{kind + " " + choice.name, curved_patch(order, 2, rng), {}, choice.shape, {}, {}, {}, {}, {}, {}};
+  const bool inner = kind == "ligaments";
+  TermGroup g = surface_group(c.mesh, inner ? SkinSide::inner : SkinSide::outer, triangle_rule(10));
+  c.u_old = smooth_displacement(c.mesh, rng, 0.05);
+  c.u = c.u_old + smooth_displacement(c.mesh, rng, 0.1);
+  const auto constant = [](int at) { return ThetaSlot{ThetaSlot::Kind::constant, at, {}}; };
+  const auto path = [](ThetaSlot::Kind k, int axis) { return ThetaSlot{k, 3 + axis, {0.05, 0.12, 0.3}}; };
+  if (inner) {
+    g.rest.clear();
+    c.terms.emplace_back("ligaments", ligament_kernels(), LigamentLaw{});
+    g.theta = {constant(0), constant(1), {ThetaSlot::Kind::field, 2, {}}};
+    c.native = VectorXd::Constant(2 + c.mesh.num_columns, 3) + uniform(rng, 2 + c.mesh.num_columns, 2);
+    c.native[0] = 5e-4;
+    c.native[1] = 0.02;
+    c.native_scale = c.native;
+  } else {
+    for (std::size_t q = 0; q < g.weight.size(); ++q) g.rest[4 * q + 3] = 0.001 * (q % 7);
+    // The shape's surface point about 0.4 mm above the middle of the patch: everything is in contact.
+    Vec3 middle = Vec3::Zero();
+    for (std::size_t q = 0; q < g.weight.size(); ++q)
+      middle += Vec3(g.rest[4 * q], g.rest[4 * q + 1], g.rest[4 * q + 2]) / static_cast<double>(g.weight.size());
+    const Vec3 centre = middle - choice.surface_point + 0.8 * choice.normal;
+    c.native = VectorXd(12);
+    c.native << 0.7, 0.01, 0.4, centre - Vec3(0.1, 0.1, 0), centre + Vec3(0.05, 0, 0), centre + Vec3(0.3, 0.4, 0);
+    c.native_scale = VectorXd::Constant(12, 0.05);
+    c.native_scale[0] = 0.7;
+    c.native_scale[2] = 0.4;
+    g.theta = {constant(0), constant(1)};
+    if (kind == "friction") g.theta.push_back(constant(2));
+    for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_now, axis));
+    if (kind == "friction") {
+      for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_old, axis));
+      c.terms.emplace_back("friction", friction_kernels(), FrictionLaw{choice.shape.get(), 0.0, 3.0, mollifier});
+    } else {
+      c.terms.emplace_back("contact", contact_kernels(), ContactLaw{choice.shape.get(), 0.0});
+    }
+  }
+  c.terms.front().add_group(std::move(g));
+  c.history.resize(static_cast<Eigen::Index>(c.term().history_size()));
+  for (Eigen::Index k = 0; 4 * k < c.history.size(); ++k)
+    c.history.segment<4>(4 * k) << 0.3, (choice.normal + uniform(rng, 3, 0.2)).normalized();
+  return c;
+}
+
+/// Dense global matrix of a term.
+class DenseSink final : public Term::MatrixSink {
+ public:
+  explicit DenseSink(int n) : matrix(MatrixXd::Zero(n, n)) {}
+  void add(const TermGroup& g, int element, double* dense) override {
+    const int n3 = 3 * g.num_nodes;
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> k(dense, n3, n3);
+    elements.emplace_back(k);
+    for (int i = 0; i < n3; ++i)
+      for (int j = 0; j < n3; ++j)
+        matrix(3 * g.nodes[static_cast<std::size_t>(element) * g.num_nodes + i / 3] + i % 3,
+               3 * g.nodes[static_cast<std::size_t>(element) * g.num_nodes + j / 3] + j % 3) += k(i, j);
+  }
+  MatrixXd matrix;
+  std::vector<MatrixXd> elements;
+};
+
+}  // namespace rhytid::test
