@@ -1,4 +1,5 @@
-// Difference quotients judged by their order: the error of a right derivative falls fourfold when the step halves.
+// Difference quotients judged by their order: the error of a right derivative falls fourfold when the step
+// halves.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,8 +13,8 @@
 
 namespace rhytid::test {
 
-/// Central differences of f along a direction (f takes the signed step) against `exact`. Passes when the error
-/// falls fourfold per halving of `step`, or is round-off already: below `floor` · (|f|/step + |exact|).
+/// Central differences of f along a direction (f takes the signed step) against `exact`. Passes when the
+/// error falls fourfold per halving of `step`, or is round-off already: below `floor` · (|f|/step + |exact|).
 inline ::testing::AssertionResult derivative_converges(const std::function<VectorXd(double)>& f,
                                                        const VectorXd& exact, double step,
                                                        double floor = 1e-12) {
@@ -36,7 +37,8 @@ inline ::testing::AssertionResult derivative_converges(const std::function<Vecto
     if (seen_order && k >= 3 && smallest_relative < 1e-3) return ::testing::AssertionSuccess();
     previous = error;
   }
-  return ::testing::AssertionFailure() << "difference quotients do not converge at second order\n" << log.str();
+  return ::testing::AssertionFailure() << "difference quotients do not converge at second order\n"
+                                       << log.str();
 }
 
 }  // namespace rhytid::test

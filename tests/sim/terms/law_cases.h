@@ -1,4 +1,5 @@
-// One random, smooth state per law, for property tests that know no law: old strain, history, parameters, strain.
+// One random, smooth state per law, for property tests that know no law: old strain, history, parameters,
+// strain.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -55,7 +56,8 @@ inline std::vector<LawCase<SkinLaw>> skin_cases() {
   std::vector<LawCase<SkinLaw>> cases;
   for (const auto& [name, scheme] :
        {std::pair{"exponential", DamperScheme::exponential}, std::pair{"literal", DamperScheme::literal},
-        std::pair{"strang", DamperScheme::strang}, std::pair{"backward_euler", DamperScheme::backward_euler}}) {
+        std::pair{"strang", DamperScheme::strang},
+        std::pair{"backward_euler", DamperScheme::backward_euler}}) {
     Rng rng(11);
     LawCase<SkinLaw> c{name, SkinLaw{scheme}, {}};
     for (double amount : {0.3, 0.1, 0.01})
@@ -144,7 +146,8 @@ inline std::vector<LawCase<ContactLaw>> contact_cases(const std::vector<ShapeCho
   std::vector<LawCase<ContactLaw>> cases;
   for (const ShapeChoice& choice : choices)
     for (double onset : {0.2, 0.0}) {
-      LawCase<ContactLaw> c{choice.name + (onset > 0 ? " smooth" : " plain"), {choice.shape.get(), onset}, {}};
+      LawCase<ContactLaw> c{
+          choice.name + (onset > 0 ? " smooth" : " plain"), {choice.shape.get(), onset}, {}};
       for (double depth : {0.1, 0.35, 0.6}) {
         LawState s;
         const Vec3 centre = uniform(rng, 3, 3), x_rest = uniform(rng, 3, 2);

@@ -1,5 +1,5 @@
-// Edges at which formulas like these become NaN or lose their digits: rest, repeated stretches, zero slip, zero ligament
-// stretch, b → 0, the continued exponential, dt ≪ τ ≪ dt, the centre of a finger on a node.
+// Edges at which formulas like these become NaN or lose their digits: rest, repeated stretches, zero slip,
+// zero ligament stretch, b → 0, the continued exponential, dt ≪ τ ≪ dt, the centre of a finger on a node.
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -47,10 +47,11 @@ TEST(LawEdges, SkinAtRestAndAtRepeatedStretches) {
   const VectorXd rest = VectorXd::Zero(6);
   VectorXd tiny = rest;
   tiny[3] = 1e-300;
-  for (DamperScheme scheme : {DamperScheme::exponential, DamperScheme::literal, DamperScheme::strang,
-                              DamperScheme::backward_euler})
-    for (const VectorXd& y : {rest, tiny, stretches(1.3, 1.3, 1.3), stretches(2, 2, 0.25), stretches(0.4, 2.5, 2.5),
-                              stretches(1 + 1e-9, 1, 1 - 1e-9), stretches(1.5, 1.5 + 1e-13, 0.5)})
+  for (DamperScheme scheme :
+       {DamperScheme::exponential, DamperScheme::literal, DamperScheme::strang, DamperScheme::backward_euler})
+    for (const VectorXd& y :
+         {rest, tiny, stretches(1.3, 1.3, 1.3), stretches(2, 2, 0.25), stretches(0.4, 2.5, 2.5),
+          stretches(1 + 1e-9, 1, 1 - 1e-9), stretches(1.5, 1.5 + 1e-13, 0.5)})
       for (const VectorXd& history : {rest, stretches(1.2, 1.2, 1 / 1.44)})
         for (double r : {1e-9, 1e-4, 0.0199999, 0.02, 0.0200001, 1.0, 50.0, 1e6}) {
           LawState s;
@@ -64,7 +65,8 @@ TEST(LawEdges, SkinAtRestAndAtRepeatedStretches) {
         }
 }
 
-/// Small strains about rest see linear elasticity: ∂σ/∂Y = ¼ (2 μ dev + 3 K vol), shear entries doubled twice over.
+/// Small strains about rest see linear elasticity: ∂σ/∂Y = ¼ (2 μ dev + 3 K vol), shear entries doubled twice
+/// over.
 TEST(LawEdges, SkinSmallStrainLimitIsLinearElasticity) {
   LawState s;
   s.e = s.e_old = VectorXd::Zero(6);
@@ -84,7 +86,8 @@ TEST(LawEdges, SkinSmallStrainLimitIsLinearElasticity) {
   }
 }
 
-/// The three numbers of every damper against 80-bit arithmetic, and continuous in dt/τ across the series switch.
+/// The three numbers of every damper against 80-bit arithmetic, and continuous in dt/τ across the series
+/// switch.
 TEST(LawEdges, DamperNumbers) {
   for (double r : {1e-12, 1e-8, 1e-5, 1e-3, 0.0199, 0.01999999, 0.02, 0.03, 0.5, 3.0, 40.0, 1e5}) {
     const long double x = r, alpha = std::exp(-x);
@@ -95,14 +98,15 @@ TEST(LawEdges, DamperNumbers) {
       post -= term;
     }
     if (r > 1) post = 1 + std::expm1(-x) / x;
-    const long double beta = r > 1 ? -std::expm1(-x) / x : 1 - post, pre = x < 1 ? x - post / beta : 1 - alpha / beta;
+    const long double beta = r > 1 ? -std::expm1(-x) / x : 1 - post,
+                      pre = x < 1 ? x - post / beta : 1 - alpha / beta;
     const Damper<double> d = damper(DamperScheme::exponential, 1.0, r);
     // Below the switch to its relative precision; above it 1 − β is good to the rounding of 1.
     const double post_digits = r < 0.02 ? 4e-16 * static_cast<double>(post) : 2.3e-16;
     EXPECT_NEAR(d.post, static_cast<double>(post), post_digits) << "r = " << r;
-    EXPECT_NEAR(d.weight, static_cast<double>(beta), 4e-16 * static_cast<double>(beta))
+    EXPECT_NEAR(d.weight, static_cast<double>(beta), 4e-16 * static_cast<double>(beta)) << "r = " << r;
+    EXPECT_NEAR(d.pre, static_cast<double>(pre), r < 0.02 ? 1e-15 * static_cast<double>(pre) : 3e-16)
         << "r = " << r;
-    EXPECT_NEAR(d.pre, static_cast<double>(pre), r < 0.02 ? 1e-15 * static_cast<double>(pre) : 3e-16) << "r = " << r;
     // Nothing is lost: relaxing before, during and after multiplies to the exact decay.
     for (DamperScheme scheme : {DamperScheme::exponential, DamperScheme::literal, DamperScheme::strang}) {
       const Damper<double> s = damper(scheme, 1.0, r);
@@ -117,7 +121,8 @@ TEST(LawEdges, DamperNumbers) {
     }
     if (r > 1) slope = (1 - alpha * (1 + x)) / (x * x);
     const Damper<Dual<1>> dd = damper(DamperScheme::exponential, Dual<1>::variable(1.0, 0), r);
-    EXPECT_NEAR(dd.post.d[0], static_cast<double>(-slope * x), 2e-13 * static_cast<double>(slope * x)) << "r = " << r;
+    EXPECT_NEAR(dd.post.d[0], static_cast<double>(-slope * x), 2e-13 * static_cast<double>(slope * x))
+        << "r = " << r;
   }
 }
 
@@ -203,7 +208,8 @@ TEST(LawEdges, ContactJustTouchingAndOutside) {
     }
 }
 
-/// An IMLS surface has no support far away: free when in front of it, infeasible (rejected by the line search) behind.
+/// An IMLS surface has no support far away: free when in front of it, infeasible (rejected by the line
+/// search) behind.
 TEST(LawEdges, OutsideTheSupportOfABone) {
   const auto surface = bone();
   const double theta[5] = {1, 0, 0, 0, 0}, rest[4] = {};
@@ -211,7 +217,8 @@ TEST(LawEdges, OutsideTheSupportOfABone) {
   const double front[3] = {0, 0, 50}, behind[3] = {0, 0, -50};
   EXPECT_EQ((ContactLaw{surface.get(), 1e-3}.stress<double>(front, nullptr, theta, rest, 1, traction)), 0);
   EXPECT_EQ(traction[2], 0);
-  EXPECT_TRUE(std::isinf(ContactLaw{surface.get(), 1e-3}.stress<double>(behind, nullptr, theta, rest, 1, traction)));
+  EXPECT_TRUE(
+      std::isinf(ContactLaw{surface.get(), 1e-3}.stress<double>(behind, nullptr, theta, rest, 1, traction)));
 }
 
 }  // namespace

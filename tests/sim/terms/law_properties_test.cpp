@@ -1,5 +1,6 @@
-// Properties that every law must have, whatever its physics: stress is the derivative of the energy, the tangent is
-// symmetric, and the derivatives of prepare, stress and update by all their inputs are those of difference quotients.
+// Properties that every law must have, whatever its physics: stress is the derivative of the energy, the
+// tangent is symmetric, and the derivatives of prepare, stress and update by all their inputs are those of
+// difference quotients.
 #include <gtest/gtest.h>
 
 #include "law_cases.h"
@@ -10,8 +11,8 @@ namespace {
 
 /// [σ, history] of a whole step as a function of (e_old, history, θ, e), for any scalar.
 template <class T, class Law>
-void whole_step(const Law& law, const T* e_old, const T* history, const T* theta, const T* e, const LawState& s,
-                T* out) {
+void whole_step(const Law& law, const T* e_old, const T* history, const T* theta, const T* e,
+                const LawState& s, T* out) {
   T prepared[Law::np + 1];
   law.template prepare<T>(e_old, history, theta, s.rest.data(), s.dt, prepared);
   (void)law.template stress<T>(e, prepared, theta, s.rest.data(), s.dt, out);
@@ -24,7 +25,8 @@ struct Inputs {
   explicit Inputs(const LawState& s) : values{s.e_old, s.history, s.theta, s.e} {}
   VectorXd evaluate(const Law& law, const LawState& s) const {
     VectorXd out = VectorXd::Zero(Law::ne + Law::ns);
-    whole_step<double>(law, values[0].data(), values[1].data(), values[2].data(), values[3].data(), s, out.data());
+    whole_step<double>(law, values[0].data(), values[1].data(), values[2].data(), values[3].data(), s,
+                       out.data());
     return out;
   }
 };
@@ -69,8 +71,8 @@ void check_law(const std::vector<LawCase<Law>>& cases) {
             const VectorXd moved = s.e + h * de;
             double unused[ne];
             VectorXd energy(1);
-            energy[0] = c.law.template stress<double>(moved.data(), prepared, s.theta.data(), s.rest.data(), s.dt,
-                                                      unused);
+            energy[0] = c.law.template stress<double>(moved.data(), prepared, s.theta.data(), s.rest.data(),
+                                                      s.dt, unused);
             return energy;
           },
           slope, s.step));

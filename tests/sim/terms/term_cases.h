@@ -1,4 +1,5 @@
-// Whole terms on a small curved patch with random states: two element layers, shared nodes, every kind of parameter slot.
+// Whole terms on a small curved patch with random states: two element layers, shared nodes, every kind of
+// parameter slot.
 #pragma once
 
 #include <memory>
@@ -48,8 +49,8 @@ inline VectorXd smooth_displacement(const SkinMesh& mesh, Rng& rng, double amoun
   for (int i = 0; i < mesh.num_nodes(); ++i) {
     const Vec3 x = mesh.rest.row(i).transpose();
     for (int a = 0; a < 3; ++a)
-      u[3 * i + a] = c[6 * a] * x[0] + c[6 * a + 1] * x[1] + c[6 * a + 2] * x[2] + c[6 * a + 3] * x[0] * x[1] +
-                     c[6 * a + 4] * x[0] * x[0] + c[6 * a + 5] * x[1] * x[2];
+      u[3 * i + a] = c[6 * a] * x[0] + c[6 * a + 1] * x[1] + c[6 * a + 2] * x[2] +
+                     c[6 * a + 3] * x[0] * x[1] + c[6 * a + 4] * x[0] * x[0] + c[6 * a + 5] * x[1] * x[2];
   }
   return u + uniform(rng, static_cast<int>(u.size()), 0.02 * amount / (mesh.order * mesh.order));
 }
@@ -57,12 +58,24 @@ inline VectorXd smooth_displacement(const SkinMesh& mesh, Rng& rng, double amoun
 inline TermCase skin_case(const KernelTable& kernels, bool viscous, DamperScheme scheme, int order,
                           int thickness_order, double amount = 0.2) {
   Rng rng(21);
-  TermCase c{viscous ? "skin" : "elastic skin", curved_patch(order, thickness_order, rng), {}, {}, {}, {}, {}, {}, {}, {}};
-  c.terms.push_back(viscous ? Term("skin", kernels, SkinLaw{scheme}) : Term("elastic", kernels, ElasticSkinLaw{}));
+  TermCase c{viscous ? "skin" : "elastic skin",
+             curved_patch(order, thickness_order, rng),
+             {},
+             {},
+             {},
+             {},
+             {},
+             {},
+             {},
+             {}};
+  c.terms.push_back(viscous ? Term("skin", kernels, SkinLaw{scheme})
+                            : Term("elastic", kernels, ElasticSkinLaw{}));
   for (int layer = 0; layer < 2; ++layer) {
     const ElementLayer& e = c.mesh.element_layers[layer];
-    TermGroup g = prism_group(c.mesh, layer, e.slabs.front(), triangle_rule(std::min(12, 2 * order + 2)), e.order + 1);
-    for (int s = 0; s < kernels.ntheta; ++s) g.theta.push_back({ThetaSlot::Kind::constant, 5 * layer + s, {}});
+    TermGroup g =
+        prism_group(c.mesh, layer, e.slabs.front(), triangle_rule(std::min(12, 2 * order + 2)), e.order + 1);
+    for (int s = 0; s < kernels.ntheta; ++s)
+      g.theta.push_back({ThetaSlot::Kind::constant, 5 * layer + s, {}});
     c.terms.front().add_group(std::move(g));
   }
   c.native = VectorXd(10);
@@ -71,7 +84,8 @@ inline TermCase skin_case(const KernelTable& kernels, bool viscous, DamperScheme
   c.u_old = smooth_displacement(c.mesh, rng, amount);
   c.u = c.u_old + smooth_displacement(c.mesh, rng, amount);
   c.history.resize(static_cast<Eigen::Index>(c.term().history_size()));
-  for (Eigen::Index k = 0; 6 * k < c.history.size(); ++k) c.history.segment<6>(6 * k) = random_strain(rng, amount);
+  for (Eigen::Index k = 0; 6 * k < c.history.size(); ++k)
+    c.history.segment<6>(6 * k) = random_strain(rng, amount);
   return c;
 }
 
@@ -99,10 +113,12 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
     // The shape's surface point about 0.4 mm above the middle of the patch: everything is in contact.
     Vec3 middle = Vec3::Zero();
     for (std::size_t q = 0; q < g.weight.size(); ++q)
-      middle += Vec3(g.rest[4 * q], g.rest[4 * q + 1], g.rest[4 * q + 2]) / static_cast<double>(g.weight.size());
+      middle +=
+          Vec3(g.rest[4 * q], g.rest[4 * q + 1], g.rest[4 * q + 2]) / static_cast<double>(g.weight.size());
     const Vec3 centre = middle - choice.surface_point + 0.8 * choice.normal;
     c.native = VectorXd(12);
-    c.native << 0.7, 0.01, 0.4, centre - Vec3(0.1, 0.1, 0), centre + Vec3(0.05, 0, 0), centre + Vec3(0.3, 0.4, 0);
+    c.native << 0.7, 0.01, 0.4, centre - Vec3(0.1, 0.1, 0), centre + Vec3(0.05, 0, 0),
+        centre + Vec3(0.3, 0.4, 0);
     c.native_scale = VectorXd::Constant(12, 0.05);
     c.native_scale[0] = 0.7;
     c.native_scale[2] = 0.4;
@@ -111,7 +127,8 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
     for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_now, axis));
     if (kind == "friction") {
       for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_old, axis));
-      c.terms.emplace_back("friction", friction_kernels(), FrictionLaw{choice.shape.get(), 0.0, 3.0, mollifier});
+      c.terms.emplace_back("friction", friction_kernels(),
+                           FrictionLaw{choice.shape.get(), 0.0, 3.0, mollifier});
     } else {
       c.terms.emplace_back("contact", contact_kernels(), ContactLaw{choice.shape.get(), 0.0});
     }

@@ -29,8 +29,8 @@ std::vector<TermCase> all_cases() {
 struct StepOutputs {
   VectorXd residual, history;
 };
-StepOutputs run_step(const TermCase& c, const VectorXd& u_old, const VectorXd& history, const VectorXd& native,
-                     const VectorXd& u) {
+StepOutputs run_step(const TermCase& c, const VectorXd& u_old, const VectorXd& history,
+                     const VectorXd& native, const VectorXd& u) {
   TermStepData data;
   c.term().prepare(c.step, native, u_old, history.data(), data);
   StepOutputs out{VectorXd::Zero(u.size()), VectorXd::Zero(history.size())};
@@ -88,7 +88,8 @@ TEST(TermKernels, TangentBlocksByOrder) {
       if (k == 1 || k == 4) du_old.col(k) = uniform(rng, nu, 0.01);
       if (k == 2 || k == 4) ds.col(k) = uniform(rng, nh, 0.02);
       if (k == 3 || k == 4)
-        dnative[k] = (uniform(rng, static_cast<int>(c.native.size()), 0.1).array() * c.native_scale.array()).matrix();
+        dnative[k] =
+            (uniform(rng, static_cast<int>(c.native.size()), 0.1).array() * c.native_scale.array()).matrix();
     }
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, D, Eigen::RowMajor>;
     const RowMajor du_rows = du, du_old_rows = du_old, ds_rows = ds;
@@ -105,7 +106,8 @@ TEST(TermKernels, TangentBlocksByOrder) {
       };
       EXPECT_TRUE(derivative_converges([&](double h) { return moved(h, false).residual; }, df.col(k), 1.0));
       if (nh > 0) {
-        EXPECT_TRUE(derivative_converges([&](double h) { return moved(h, true).history; }, ds_new.col(k), 1.0, 1e-11));
+        EXPECT_TRUE(derivative_converges([&](double h) { return moved(h, true).history; }, ds_new.col(k), 1.0,
+                                         1e-11));
       }
     }
   }
@@ -124,8 +126,8 @@ TEST(TermKernels, AdjointBlocksAreTransposesOfTangentBlocks) {
     VectorXd u_bar = VectorXd::Zero(nu), u_old_bar = u_bar, s_old_bar = VectorXd::Zero(nh),
              native_bar = VectorXd::Zero(c.native.size());
     c.term().adjoint_update(c.step, data, c.u, s_bar.data(), u_bar);
-    c.term().adjoint_step(c.step, data, c.u, c.u_old, c.history.data(), adj, s_bar.data(), u_old_bar, s_old_bar.data(),
-                          native_bar);
+    c.term().adjoint_step(c.step, data, c.u, c.u_old, c.history.data(), adj, s_bar.data(), u_old_bar,
+                          s_old_bar.data(), native_bar);
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, D, Eigen::RowMajor>;
     RowMajor du = RowMajor::Zero(nu, D), du_old = du, ds = RowMajor::Zero(nh, D);
     std::vector<VectorXd> dnative;
@@ -174,7 +176,8 @@ TEST(TermKernels, ProjectedHessianIsSemidefiniteAndEqualsRawWhenRawIs) {
       EXPECT_GE(added.eigenvalues().minCoeff(), -1e-11 * p.eigenvalues().maxCoeff());
       raw_lowest = std::min(raw_lowest, r.eigenvalues().minCoeff() / r.eigenvalues().maxCoeff());
     }
-    const bool convex = c.name.find("plane") != std::string::npos || c.name.find("ligaments") != std::string::npos;
+    const bool convex =
+        c.name.find("plane") != std::string::npos || c.name.find("ligaments") != std::string::npos;
     if (convex) {
       EXPECT_LE((projected.matrix - raw.matrix).norm(), 1e-14 * raw.matrix.norm());
     } else if (c.name.find("skin") != std::string::npos) {
@@ -200,8 +203,8 @@ TEST(TermKernels, InstructionSetsAgree) {
   for (bool viscous : {true, false})
     for (const auto& [p, q] : {std::pair{1, 1}, {2, 2}, {4, 3}}) {
       SCOPED_TRACE("p = " + std::to_string(p) + (viscous ? ", viscous" : ", elastic"));
-      const TermCase a = skin_case(viscous ? skin_table_avx2 : elastic_table_avx2, viscous, DamperScheme::exponential,
-                                   p, q, p == 4 ? 0.03 : 0.2),
+      const TermCase a = skin_case(viscous ? skin_table_avx2 : elastic_table_avx2, viscous,
+                                   DamperScheme::exponential, p, q, p == 4 ? 0.03 : 0.2),
                      b = skin_case(viscous ? skin_table_baseline : elastic_table_baseline, viscous,
                                    DamperScheme::exponential, p, q, p == 4 ? 0.03 : 0.2);
       const int nu = static_cast<int>(a.u.size()), nh = static_cast<int>(a.history.size());
@@ -214,7 +217,8 @@ TEST(TermKernels, InstructionSetsAgree) {
         auto& r = results[c == &b];
         TermStepData data;
         c->term().prepare(c->step, c->native, c->u_old, c->history.data(), data);
-        r.push_back(Eigen::Map<VectorXd>(data.prepared.data(), static_cast<Eigen::Index>(data.prepared.size())));
+        r.push_back(
+            Eigen::Map<VectorXd>(data.prepared.data(), static_cast<Eigen::Index>(data.prepared.size())));
         VectorXd g = VectorXd::Zero(nu);
         r.push_back(VectorXd::Constant(1, c->term().energy(c->step, data, c->u, &g, nullptr)));
         r.push_back(g);
@@ -227,13 +231,14 @@ TEST(TermKernels, InstructionSetsAgree) {
         c->term().update(c->step, data, c->u, h.data());
         r.push_back(h);
         RowMajor df = RowMajor::Zero(nu, D), dh = RowMajor::Zero(nh, D);
-        c->term().tangent(c->step, data, c->u, c->u_old, c->history.data(), {D, du.data(), du.data(), ds.data(), {&dn}},
-                          df.data(), dh.data());
+        c->term().tangent(c->step, data, c->u, c->u_old, c->history.data(),
+                          {D, du.data(), du.data(), ds.data(), {&dn}}, df.data(), dh.data());
         r.push_back(Eigen::Map<VectorXd>(df.data(), df.size()));
         r.push_back(Eigen::Map<VectorXd>(dh.data(), dh.size()));
         VectorXd ub = VectorXd::Zero(nu), uob = ub, sb = VectorXd::Zero(nh), nb = VectorXd::Zero(10);
         c->term().adjoint_update(c->step, data, c->u, s_bar.data(), ub);
-        c->term().adjoint_step(c->step, data, c->u, c->u_old, c->history.data(), adj, s_bar.data(), uob, sb.data(), nb);
+        c->term().adjoint_step(c->step, data, c->u, c->u_old, c->history.data(), adj, s_bar.data(), uob,
+                               sb.data(), nb);
         for (const VectorXd& v : {ub, uob, sb, nb}) r.push_back(v);
       }
       ASSERT_TRUE(std::isfinite(results[0][1][0]));
