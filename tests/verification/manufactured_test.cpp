@@ -30,7 +30,7 @@ double cosine(double a) {
 }
 
 constexpr double kAmplitude[3] = {0.04, -0.05, 0.06},
-                 kWave[3][3] = {{2.1, 1.0, 1.4}, {-0.8, 1.9, 1.1}, {1.3, -1.2, 2.0}},
+                 kWave[3][3] = {{1.4, 0.7, 0.9}, {-0.5, 1.3, 0.7}, {0.9, -0.8, 1.3}},
                  kPhase[3] = {0.3, 0.9, -0.4};
 
 /// u*_a = A_a sin(k_a·X + φ_a) and its gradient H_aI = A_a k_aI cos(...), row-major.

@@ -1,0 +1,187 @@
+// Whole runs: the same bits with any number of threads, bisection in a hard step, one answer from three
+// minimisers, and features that are not in the scene do no work.
+#include "sim/time/simulate.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "sim/core/error.h"
+#include "sim/core/parallel.h"
+#include "sim/scene/load.h"
+#include "sim/scene/scene_model.h"
+#include "tests/support/small_scenes.h"
+
+namespace rhytid {
+namespace {
+
+Trajectory run_scene(const SceneModel& m, const RunOptions& options) {
+  return simulate(m.model(), m.native(), options);
+}
+
+Scene small_drag(int order, int frames) {
+  Scene s = parse_scene_text(test::drag_scene(order, frames), "drag.json");
+  s.skin.surface.grid_cells = {4, 3};
+  return s;
+}
+
+bool same_bits(const VectorXd& a, const VectorXd& b) {
+  return a.size() == b.size() &&
+         std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<std::size_t>(a.size())) == 0;
+}
+
+TEST(Simulate, SameBitsWithOneAndTwoThreads) {
+  const SceneModel m(small_drag(2, 5));
+  const int before = num_threads();
+  set_num_threads(1);
+  const Trajectory one = run_scene(m, m.run_options());
+  set_num_threads(2);
+  const Trajectory two = run_scene(m, m.run_options());
+  set_num_threads(5);
+  const Trajectory five = run_scene(m, m.run_options());
+  set_num_threads(before);
+  ASSERT_TRUE(one.complete) << one.failure;
+  for (const Trajectory* other : {&two, &five}) {
+    ASSERT_EQ(one.steps.size(), other->steps.size());
+    for (std::size_t i = 0; i < one.steps.size(); ++i) {
+      EXPECT_TRUE(same_bits(one.steps[i].state.u, other->steps[i].state.u)) << "step " << i;
+      EXPECT_TRUE(same_bits(one.steps[i].state.history, other->steps[i].state.history)) << "step " << i;
+    }
+  }
+  EXPECT_GT(one.at_frame(5).u.lpNorm<Eigen::Infinity>(), 0.1) << "nothing moved";
+}
+
+TEST(Simulate, HardStepIsBisectedAndEndsInTheSameFrames) {
+  Scene s = small_drag(2, 2);
+  s.colliders[0].path[1].time = 1. / 24;  // the whole press in one frame
+  s.colliders[0].path[1].position[2] = 4.2;
+  const SceneModel m(s);
+  RunOptions options = m.run_options();
+  const Trajectory easy = run_scene(m, options);
+  ASSERT_TRUE(easy.complete) << easy.failure;
+  int most = 0;
+  for (const StepRecord& r : easy.steps) most = std::max(most, r.report.iterations);
+  options.minimiser.max_iterations = most - 1;  // the hardest step now fails at its full length
+  options.max_bisections = 6;
+  const Trajectory hard = run_scene(m, options);
+  ASSERT_TRUE(hard.complete) << hard.failure;
+  EXPECT_GT(hard.steps.size(), easy.steps.size());
+  ASSERT_EQ(hard.frames(), 2);
+  bool bisected = false;
+  double t = 0;
+  for (std::size_t i = 0; i < hard.steps.size(); ++i) {
+    const StepRecord& r = hard.steps[i];
+    bisected = bisected || r.bisections > 0;
+    EXPECT_EQ(r.step.index, static_cast<int>(i));
+    EXPECT_EQ(r.step.t_old, t) << "steps must join";
+    EXPECT_GT(r.step.t, t);
+    EXPECT_NEAR(r.step.dt() * 24, std::ldexp(1.0, -r.bisections), 1e-12);
+    t = r.step.t;
+  }
+  EXPECT_TRUE(bisected);
+  for (int frame = 0; frame <= 2; ++frame) EXPECT_EQ(hard.at_frame(frame).time, easy.at_frame(frame).time);
+  // Not allowed to bisect: a clear failure that keeps what was reached.
+  options.max_bisections = 0;
+  const Trajectory failed = run_scene(m, options);
+  EXPECT_FALSE(failed.complete);
+  EXPECT_NE(failed.failure.find("frame"), std::string::npos) << failed.failure;
+  EXPECT_LT(failed.frames(), 2);
+  EXPECT_EQ(static_cast<int>(failed.frame_end.back()), static_cast<int>(failed.steps.size()));
+}
+
+TEST(Simulate, SubstepsEndInTheSameFrameTimesAndConverge) {
+  Scene s = small_drag(1, 4);
+  s.skin.surface.grid_cells = {3, 2};
+  double moved[3];
+  for (int k = 0; k < 3; ++k) {
+    s.time.substeps = 1 << k;
+    const SceneModel m(s);
+    const Trajectory run = run_scene(m, m.run_options());
+    ASSERT_TRUE(run.complete) << run.failure;
+    EXPECT_EQ(run.frames(), 4);
+    EXPECT_EQ(static_cast<int>(run.steps.size()), 4 << k);
+    EXPECT_EQ(run.at_frame(4).time, 4. / 24);
+    moved[k] = run.at_frame(4).u.norm();
+  }
+  EXPECT_LT(std::fabs(moved[2] - moved[1]), std::fabs(moved[1] - moved[0]));
+}
+
+TEST(Simulate, ThreeMinimisersReachTheSameStates) {
+  const SceneModel m(small_drag(2, 5));
+  RunOptions options = m.run_options();
+  options.minimiser.relative_tolerance = 1e-10;
+  const Trajectory newton = run_scene(m, options);
+  ASSERT_TRUE(newton.complete) << newton.failure;
+  for (Minimiser method : {Minimiser::newton_projected, Minimiser::lbfgs}) {
+    options.minimiser.method = method;
+    options.minimiser.max_iterations = 1000;
+    const Trajectory other = run_scene(m, options);
+    ASSERT_TRUE(other.complete) << name(method) << ": " << other.failure;
+    double worst = 0, energy = 0;
+    for (int frame = 1; frame <= newton.frames(); ++frame) {
+      worst = std::max(worst, (newton.at_frame(frame).u - other.at_frame(frame).u).lpNorm<Eigen::Infinity>());
+      const double a = newton.steps[static_cast<std::size_t>(newton.frame_end[frame] - 1)].report.energy,
+                   b = other.steps[static_cast<std::size_t>(other.frame_end[frame] - 1)].report.energy;
+      energy = std::max(energy, std::fabs(a - b) / a);
+    }
+    std::printf("%s against newton: %.1e mm, energy %.1e\n", name(method), worst, energy);
+    EXPECT_LE(worst, 1e-6) << name(method);
+    EXPECT_LE(energy, 1e-10) << name(method);
+  }
+}
+
+TEST(Simulate, WhatIsNotInTheSceneDoesNoWork) {
+  Scene s = small_drag(1, 1);
+  s.ligaments.reset();
+  s.base.reset();
+  s.colliders[0].friction.reset();
+  for (LayerScene& l : s.skin.layers) l.relaxing_fraction = 0;
+  const SceneModel m(s);
+  ASSERT_EQ(m.model().terms.size(), 2u);  // elastic skin and the finger
+  EXPECT_EQ(m.model().history_size(), 0u);
+  const Trajectory run = run_scene(m, m.run_options());
+  ASSERT_TRUE(run.complete) << run.failure;
+  for (const Term& t : m.model().terms) {
+    EXPECT_EQ(t.counters().update, 0);
+    EXPECT_GT(t.counters().gradient, 0);
+  }
+}
+
+TEST(Simulate, ContinuesFromAStateAsIfItHadNotStopped) {
+  const SceneModel m(small_drag(1, 4));
+  RunOptions options = m.run_options();
+  const Trajectory whole = run_scene(m, options);
+  ASSERT_TRUE(whole.complete);
+  options.frames = 2;
+  const Trajectory first = run_scene(m, options);
+  const Trajectory second = simulate(m.model(), m.native(), options, {}, &first.at_frame(2));
+  ASSERT_TRUE(second.complete);
+  EXPECT_NEAR(second.at_frame(2).time, whole.at_frame(4).time, 1e-15);
+  EXPECT_LE((second.at_frame(2).u - whole.at_frame(4).u).lpNorm<Eigen::Infinity>(), 1e-7);
+}
+
+TEST(Simulate, ObserverSeesEveryStepAndCanStop) {
+  const SceneModel m(small_drag(1, 3));
+  int steps = 0, frames = 0;
+  RunObserver observer;
+  observer.step = [&](const StepEvent& e) {
+    ++steps;
+    frames += e.frame_done;
+    EXPECT_EQ(e.state.time, e.record.step.t);
+    EXPECT_EQ(e.problem.old().time, e.record.step.t_old);
+  };
+  const Trajectory run = simulate(m.model(), m.native(), m.run_options(), observer);
+  EXPECT_EQ(steps, static_cast<int>(run.steps.size()));
+  EXPECT_EQ(frames, 3);
+  observer.step = nullptr;
+  observer.iteration = [](int frame, double, int, double, double) { return frame < 2; };
+  const Trajectory stopped = simulate(m.model(), m.native(), m.run_options(), observer);
+  EXPECT_FALSE(stopped.complete);
+  EXPECT_EQ(stopped.frames(), 1);
+  RunOptions bad;
+  bad.frame_rate = 0;
+  EXPECT_THROW((void)simulate(m.model(), m.native(), bad), ContractError);
+}
+
+}  // namespace
+}  // namespace rhytid
