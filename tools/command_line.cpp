@@ -34,7 +34,9 @@ void add_verb(CLI::App& app, Verb& verb, CommonOptions& options) {
   CLI::App* sub = app.add_subcommand(help.name, help.summary);
   sub->footer(footer(help));
   if (verb.takes_file()) {
-    sub->add_option("file", options.file, "scene.json or case.json")->required()->option_text("FILE");
+    sub->add_option("file", options.file, "scene.json or case.json")
+        ->required(!verb.file_is_optional())
+        ->option_text("FILE");
     sub->add_option("-o,--output", options.output, "folder for results (default run/<name of the scene>)")
         ->option_text("DIR");
     sub->add_option("--set", options.settings,

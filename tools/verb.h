@@ -66,6 +66,8 @@ class Verb {
   virtual VerbHelp help() const = 0;
   /// Whether the scene/case file is required, with -o and --set; else none of the three is accepted.
   virtual bool takes_file() const { return true; }
+  /// Whether the file may be left out all the same (options.file is then empty).
+  virtual bool file_is_optional() const { return false; }
   /// Options of its own, bound to members.
   virtual void add_options(CLI::App&) {}
   /// Does the work. Throws InputError for bad input (exit 2); numerical outcomes are exit codes.
