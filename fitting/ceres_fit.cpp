@@ -1,0 +1,148 @@
+#include <ceres/ceres.h>
+#include <glog/logging.h>
+
+#include <cmath>
+
+#include "fitting/optimise.h"
+
+namespace rhytid::fitting {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// The experiment as one residual block.
+class ExperimentCost final : public ceres::CostFunction {
+ public:
+  ExperimentCost(FitProblem& problem, int max_evaluations)
+      : problem_(problem), max_evaluations_(max_evaluations) {
+    set_num_residuals(problem.num_residuals());
+    mutable_parameter_block_sizes()->push_back(problem.num_parameters());
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const VectorXd t = Eigen::Map<const VectorXd>(parameters[0], problem_.num_parameters());
+    // Runs are counted by their effect: an evaluation at the kept point costs none.
+    if (problem_.counters().forward_runs >= max_evaluations_ && !(t == last_)) return false;
+    const FitEvaluation& evaluation = problem_.evaluate(t);
+    last_ = t;
+    if (evaluation.failed) return false;
+    Eigen::Map<VectorXd>(residuals, problem_.num_residuals()) = evaluation.residuals;
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    const std::optional<MatrixXd> jacobian = problem_.jacobian(t);
+    if (!jacobian) return false;
+    Eigen::Map<RowMajor>(jacobians[0], problem_.num_residuals(), problem_.num_parameters()) = *jacobian;
+    gradient_norm_ = (jacobian->transpose() * evaluation.residuals).norm();
+    return true;
+  }
+
+  /// |∂F/∂t| where the Jacobian was last formed: the accepted point. (Ceres reports the length of the
+  /// projected gradient step instead, which a bound cuts.)
+  double gradient_norm() const { return gradient_norm_; }
+
+ private:
+  FitProblem& problem_;
+  int max_evaluations_;
+  mutable VectorXd last_;
+  mutable double gradient_norm_ = 0;
+};
+
+/// Ceres logs a failed evaluation to stderr by itself; here it is a status.
+class QuietLog {
+ public:
+  QuietLog() : level_(FLAGS_minloglevel) { FLAGS_minloglevel = google::GLOG_FATAL; }
+  ~QuietLog() { FLAGS_minloglevel = level_; }
+  QuietLog(const QuietLog&) = delete;
+  QuietLog& operator=(const QuietLog&) = delete;
+
+ private:
+  int level_;
+};
+
+/// Writes the history and ends the fit when the budget is spent or the user stops it.
+class Recorder final : public ceres::IterationCallback {
+ public:
+  Recorder(FitProblem& problem, const ExperimentCost& cost, const VectorXd& t, int max_evaluations,
+           const FitIterationCallback& callback, std::vector<FitIteration>& history)
+      : problem_(problem),
+        cost_(cost),
+        t_(t),
+        max_evaluations_(max_evaluations),
+        callback_(callback),
+        history_(history) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
+    const VectorXd values = problem_.parametrisation().values(t_);
+    history_.push_back({.iteration = s.iteration,
+                        .evaluations = problem_.counters().forward_runs,
+                        .cost = s.cost,
+                        .gradient_norm = cost_.gradient_norm(),
+                        .step_norm = s.step_norm,
+                        .seconds = s.cumulative_time_in_seconds,
+                        .values = {values.begin(), values.end()}});
+    if (callback_) callback_(history_.back());
+    const bool is_spent = problem_.counters().forward_runs >= max_evaluations_;
+    return is_spent || problem_.was_stopped() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  FitProblem& problem_;
+  const ExperimentCost& cost_;
+  const VectorXd& t_;
+  int max_evaluations_;
+  const FitIterationCallback& callback_;
+  std::vector<FitIteration>& history_;
+};
+
+}  // namespace
+
+OptimiserOutcome fit_with_ceres(FitProblem& problem, const OptimiserOptions& options,
+                                const FitIterationCallback& callback) {
+  OptimiserOutcome outcome;
+  VectorXd t = problem.parametrisation().initial();
+  const int last_run = problem.counters().forward_runs + options.max_evaluations;
+
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ExperimentCost cost(problem, last_run);
+  ceres::Problem ceres_problem(ownership);
+  ceres_problem.AddResidualBlock(&cost, nullptr, t.data());
+  for (int k = 0; k < problem.num_parameters(); ++k) {
+    ceres_problem.SetParameterLowerBound(t.data(), k, problem.parametrisation().lower()[k]);
+    ceres_problem.SetParameterUpperBound(t.data(), k, problem.parametrisation().upper()[k]);
+  }
+
+  ceres::Solver::Options solver;
+  solver.minimizer_type = ceres::TRUST_REGION;
+  solver.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
+  solver.linear_solver_type = ceres::DENSE_QR;
+  solver.initial_trust_region_radius = 1e2;  // the first steps of a far start would leave the feasible region
+  solver.max_num_iterations = options.max_evaluations;
+  solver.max_num_consecutive_invalid_steps = 8;
+  solver.function_tolerance = options.relative_decrease;
+  solver.parameter_tolerance = options.step_tolerance;
+  solver.gradient_tolerance = 1e-9;
+  solver.line_search_interpolation_type = ceres::QUADRATIC;  // values only: trial points need no Jacobian
+  solver.num_threads = 1;
+  solver.logging_type = ceres::SILENT;
+  solver.update_state_every_iteration = true;
+  Recorder recorder(problem, cost, t, last_run, callback, outcome.history);
+  solver.callbacks.push_back(&recorder);
+  ceres::Solver::Summary summary;
+  const QuietLog quiet;
+  ceres::Solve(solver, &ceres_problem, &summary);
+
+  outcome.detail = summary.message;
+  outcome.t = problem.best().size() > 0 ? problem.best() : problem.parametrisation().initial();
+  using Status = OptimiserOutcome::Status;
+  if (problem.was_stopped())
+    outcome.status = Status::stopped;
+  else if (problem.best().size() == 0)
+    outcome.status = Status::failed;
+  else if (summary.termination_type == ceres::CONVERGENCE)
+    outcome.status = Status::converged;
+  else if (problem.counters().forward_runs >= last_run || summary.termination_type == ceres::NO_CONVERGENCE)
+    outcome.status = Status::max_evaluations;
+  return outcome;
+}
+
+}  // namespace rhytid::fitting

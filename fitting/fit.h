@@ -1,0 +1,43 @@
+// The whole fit: problem, optimiser, intervals, record.
+// Tests: tests/fitting/fit_test.cpp
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+
+#include "fitting/case.h"
+#include "fitting/fit_problem.h"
+#include "fitting/fit_result.h"
+#include "fitting/optimise.h"
+
+namespace rhytid::fitting {
+
+struct FitInput {
+  Scene scene;
+  Camera camera;
+  TrackSet tracks;
+  FitCase options;
+  std::map<std::string, double> truth;  ///< address by names → value, internal units; empty for real footage
+};
+
+struct FitObserver {
+  std::function<void(const FitProgress&)> run;         ///< after every forward run
+  std::function<void(const FitIteration&)> iteration;  ///< after every iteration of the optimiser
+  std::function<void(const FitProblem&)> registered;   ///< once, before the first run
+  std::function<bool()> should_stop;                   ///< polled inside runs
+};
+
+/// Fits. Fields of the result about files and the case are left to the caller. Throws InputError for a case
+/// that cannot be fitted; a forward model that fails or an optimiser that runs out is a status.
+FitResult run_fit(const FitInput& input, const FitObserver& observer = {});
+
+/// Truth values from truth.json, {"parameters": {address: number or quantity with unit}}; keys are rewritten
+/// to names. Addresses that the scene does not have are left out. Throws InputError on anything malformed.
+std::map<std::string, double> read_truth(const std::string& path, const Scene& scene);
+
+/// The answer as text: a table of parameter, initial, fitted, 95 % interval and, where known, truth, error
+/// and whether the interval holds it; then what the footage does not tell.
+std::string answer_text(const FitResult& result);
+
+}  // namespace rhytid::fitting

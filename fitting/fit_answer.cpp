@@ -1,0 +1,109 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "fitting/fit.h"
+#include "sim/core/error.h"
+#include "sim/core/units.h"
+#include "sim/output/atomic_file.h"
+#include "sim/scene/parameter.h"
+
+namespace rhytid::fitting {
+namespace {
+
+using Row = std::vector<std::string>;
+
+std::string number(double x) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.4g", x);
+  return text;
+}
+
+Row table_row(const std::string& name, const std::string& unit, const std::string& initial, double value,
+              double low, double high, bool determined, const std::optional<double>& truth, bool has_truth) {
+  Row row = {name, unit, initial, number(value), number(low) + " .. " + number(high)};
+  if (!determined) row[4] += " (not determined)";
+  if (!has_truth) return row;
+  if (!truth) {
+    row.insert(row.end(), {"", "", ""});
+    return row;
+  }
+  char error[32];
+  std::snprintf(error, sizeof(error), "%+.1f", 100 * (value / *truth - 1));
+  row.insert(row.end(), {number(*truth), error, *truth >= low && *truth <= high ? "yes" : "no"});
+  return row;
+}
+
+/// Characters, not bytes: units hold µ and ².
+std::size_t length(const std::string& text) {
+  return std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
+}
+
+std::string layout(const std::vector<Row>& rows) {
+  std::vector<std::size_t> width(rows.front().size(), 0);
+  for (const Row& row : rows)
+    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], length(row[c]));
+  std::string text;
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string padding(width[c] - length(row[c]), ' ');
+      // Text to the left, numbers to the right.
+      line += c < 2 ? row[c] + padding : padding + row[c];
+      line += "  ";
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string answer_text(const FitResult& result) {
+  const auto knows_truth = [](const auto& x) { return x.truth.has_value(); };
+  const bool has_truth = std::any_of(result.parameters.begin(), result.parameters.end(), knows_truth);
+  Row header = {"parameter", "unit", "initial", "fitted", "95 % interval"};
+  if (has_truth) header.insert(header.end(), {"truth", "error %", "inside?"});
+  std::vector<Row> rows = {header};
+  for (const FittedParameter& p : result.parameters)
+    rows.push_back(table_row(p.name + (p.at_bound ? " (at bound)" : ""), p.unit, number(p.initial), p.value,
+                             p.low95, p.high95, p.determined, p.truth, has_truth));
+  for (const DerivedQuantity& d : result.derived)
+    rows.push_back(table_row(d.name, d.unit, "", d.value, d.low95, d.high95, std::isfinite(d.high95), d.truth,
+                             has_truth));
+  std::string text = layout(rows) + "\n";
+  text += "Status: " + result.status + " after " + std::to_string(result.forward_runs) +
+          " forward runs; residual " + number(result.rms_px) + " px rms over " +
+          std::to_string(result.num_observations) + " observations of " + std::to_string(result.num_tracks) +
+          " tracks, reduced chi-square " + number(result.reduced_chi_square) + ".\n";
+  text += result.gauge + "\n";
+  for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";
+  return text;
+}
+
+std::map<std::string, double> read_truth(const std::string& path, const Scene& scene) {
+  const nlohmann::json json = nlohmann::json::parse(read_file(path), nullptr, false);
+  if (json.is_discarded()) throw InputError(path, "no JSON", "{\"parameters\": {address: value}}");
+  if (!json.is_object() || !json.contains("parameters") || !json["parameters"].is_object())
+    throw InputError(path, "no object 'parameters'", "{\"parameters\": {address: value}}");
+  std::map<std::string, double> truth;
+  for (const auto& [address, value] : json["parameters"].items()) {
+    ParameterSpec spec;
+    try {
+      spec = describe_parameter(scene, address);
+    } catch (const InputError&) {
+      continue;  // the true scene may have what the fitted one lacks
+    }
+    if (value.is_number())
+      truth[spec.address] = value.get<double>();
+    else if (value.is_string())
+      truth[spec.address] = parse_quantity(value.get<std::string>(), spec.dimension, path + ": " + address);
+    else
+      throw InputError(path + ": " + address, value.dump(), "a number or a quantity");
+  }
+  return truth;
+}
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,242 @@
+#include "fitting/fit_problem.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "adjoint/sweeps.h"
+#include "sim/core/error.h"
+
+namespace rhytid::fitting {
+namespace {
+
+int last_used_frame(const Scene& scene, const FitCase& fit) {
+  return fit.last_frame > 0 ? std::min(fit.last_frame, scene.time.frames) : scene.time.frames;
+}
+
+/// Footage and simulation must agree on when frame f is; half a frame at the end is too much.
+void check_times(const Track& track, double frame_rate) {
+  for (const Observation& o : track.observations)
+    if (std::fabs(o.time_s * frame_rate - o.frame) > 0.5)
+      throw InputError("tracks: track " + std::to_string(track.id) + ", frame " + std::to_string(o.frame),
+                       std::to_string(o.time_s) + " s",
+                       std::to_string(o.frame / frame_rate) + " s (the scene's frame rate is " +
+                           std::to_string(frame_rate) + " 1/s)");
+}
+
+}  // namespace
+
+FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& camera, const TrackSet& tracks)
+    : parametrisation_(scene, fit), model_(parametrisation_.scene(parametrisation_.initial())) {
+  options_ = model_.run_options();
+  options_.frames = last_used_frame(scene, fit);
+  options_.keep_states = true;
+  options_.minimiser.polish = true;  // gradients are then exact to the square of the tolerance
+  if (options_.frames < 1) throw InputError("fit: frames", "0", "a scene with at least one frame after rest");
+  registration_ = register_tracks(tracks, camera, model_.model().mesh, fit.rim_margin);
+  choose_observations(tracks, fit, camera.name);
+
+  std::vector<adjoint::MaterialPoint> points;
+  std::vector<std::vector<int>> points_in_frame(options_.frames + 1);
+  output_row_.resize(compared_.size());
+  for (std::size_t i = 0; i < compared_.size(); ++i)
+    for (const int f : compared_[i].frames) {
+      output_row_[i].push_back(2 * static_cast<int>(points_in_frame[f].size()));
+      points_in_frame[f].push_back(static_cast<int>(i));
+    }
+  for (const RegisteredTrack& r : registration_.tracks) points.push_back(r.point);
+  prediction_.emplace(model_.model().mesh, std::move(points), camera, std::move(points_in_frame));
+
+  for (const TrackNoise& n : noise_) num_residuals_ += n.num_rows();
+  for (const FitVariable& v : parametrisation_.variables()) num_residuals_ += v.prior_sigma ? 1 : 0;
+}
+
+void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit, const std::string& camera) {
+  const int first = std::max(1, fit.first_frame);
+  std::vector<RegisteredTrack> used;
+  for (const RegisteredTrack& r : registration_.tracks) {
+    const Track& track = tracks.tracks[r.track];
+    check_times(track, options_.frame_rate);
+    ComparedTrack compared{r.track, {}, {}};
+    std::vector<Eigen::Matrix2d> covariances;
+    for (const Observation& o : track.observations) {
+      if (o.status != TrackStatus::ok || o.frame < first || o.frame > options_.frames) continue;
+      compared.frames.push_back(o.frame);
+      compared.observed.push_back(o.pixel);
+      covariances.push_back(with_floor(o.covariance, fit.min_sigma));
+    }
+    if (compared.frames.empty()) continue;
+    num_observations_ += static_cast<int>(compared.frames.size());
+    noise_.emplace_back(with_floor(track.at(0)->covariance, fit.min_sigma), covariances, fit.robust_scale);
+    compared_.push_back(std::move(compared));
+    used.push_back(r);
+  }
+  registration_.tracks = std::move(used);
+  if (2 * num_observations_ <= num_parameters())
+    throw InputError("fit: tracks of camera '" + camera + "'",
+                     std::to_string(num_observations_) + " usable observations in frames " +
+                         std::to_string(first) + ".." + std::to_string(options_.frames) + " (" +
+                         std::to_string(registration_.report.not_seen) + " tracks not seen in frame 0, " +
+                         std::to_string(registration_.report.missed_mesh) + " beside the skin, " +
+                         std::to_string(registration_.report.back_side) + " on its back, " +
+                         std::to_string(registration_.report.near_rim) + " near the rim)",
+                     "more numbers than the " + std::to_string(num_parameters()) + " parameters");
+}
+
+int FitProblem::degrees_of_freedom() const {
+  int dof = 2 * num_observations_ - num_parameters();
+  for (const FitVariable& v : parametrisation_.variables()) dof += v.prior_sigma ? 1 : 0;
+  return dof;
+}
+
+const FitEvaluation& FitProblem::evaluate(const VectorXd& t) {
+  if (!is_current(t)) run(t);
+  return evaluation_;
+}
+
+void FitProblem::run(const VectorXd& t) {
+  const auto start = std::chrono::steady_clock::now();
+  t_ = t;
+  difference_jacobians_.reset();
+  evaluation_ = FitEvaluation();
+  trajectory_ = Trajectory();
+  FitProgress progress;
+  progress.values = parametrisation_.values(t);
+  native_ = model_.native(parametrisation_.scene(t));
+  RunObserver observer;
+  observer.iteration = [&](int, double, int, double, double) {
+    was_stopped_ = was_stopped_ || (should_stop && should_stop());
+    return !was_stopped_;
+  };
+  trajectory_ = simulate(model_.model(), native_, options_, observer);
+  if (trajectory_.complete)
+    compare();
+  else
+    evaluation_.failure = trajectory_.failure;
+  progress.forward_runs = ++counters_.forward_runs;
+  if (evaluation_.failed) ++counters_.failed_runs;
+  progress.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  counters_.forward_seconds.push_back(progress.seconds);
+  if (!evaluation_.failed && (best_.size() == 0 || evaluation_.cost < best_cost_)) {
+    best_ = t;
+    best_cost_ = evaluation_.cost;
+  }
+  progress.cost = evaluation_.cost;
+  progress.failed = evaluation_.failed;
+  progress.failure = evaluation_.failure;
+  if (on_run) on_run(progress);
+}
+
+void FitProblem::compare() {
+  std::vector<VectorXd> predicted(frames() + 1);
+  for (int f = 0; f <= frames(); ++f) predicted[f] = prediction_->values(f, trajectory_.at_frame(f));
+  evaluation_.residuals.resize(num_residuals_);
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < compared_.size(); ++i) {
+    const ComparedTrack& c = compared_[i];
+    VectorXd r(2 * c.frames.size());
+    for (std::size_t j = 0; j < c.frames.size(); ++j)
+      r.segment<2>(2 * j) = c.observed[j] - predicted[c.frames[j]].segment<2>(output_row_[i][j]);
+    if (!r.allFinite()) {
+      evaluation_.failure = "a tracked point left the view of the camera";
+      return;
+    }
+    evaluation_.tracks.push_back(noise_[i].evaluate(r));
+    evaluation_.residuals.segment(row, noise_[i].num_rows()) = evaluation_.tracks.back().whitened;
+    row += noise_[i].num_rows();
+    evaluation_.differences.push_back(std::move(r));
+  }
+  for (int k = 0; k < num_parameters(); ++k)
+    if (const auto& prior = parametrisation_.variables()[k].prior_sigma)
+      evaluation_.residuals[row++] = (t_[k] - parametrisation_.initial()[k]) / *prior;
+  evaluation_.cost = 0.5 * evaluation_.residuals.squaredNorm();
+  evaluation_.failed = false;
+}
+
+std::optional<std::vector<MatrixXd>> FitProblem::difference_jacobians(const VectorXd& t) {
+  if (evaluate(t).failed) return std::nullopt;
+  if (difference_jacobians_) return difference_jacobians_;
+  const auto start = std::chrono::steady_clock::now();
+  adjoint::TangentResult tangent;
+  try {
+    tangent = adjoint::tangent_sweep(model_.model(), native_, trajectory_, *prediction_,
+                                     parametrisation_.native_directions(model_, t));
+  } catch (const adjoint::GradientError& error) {
+    evaluation_.failure = error.what();
+    return std::nullopt;
+  }
+  std::vector<MatrixXd> result;
+  for (std::size_t i = 0; i < compared_.size(); ++i) {
+    const ComparedTrack& c = compared_[i];
+    MatrixXd dr(2 * c.frames.size(), num_parameters());
+    for (std::size_t j = 0; j < c.frames.size(); ++j)
+      dr.middleRows<2>(2 * j) = -tangent.frames[c.frames[j]].middleRows<2>(output_row_[i][j]);
+    result.push_back(std::move(dr));
+  }
+  ++counters_.tangent_sweeps;
+  counters_.tangent_seconds.push_back(
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  difference_jacobians_ = std::move(result);
+  return difference_jacobians_;
+}
+
+std::optional<MatrixXd> FitProblem::jacobian(const VectorXd& t) {
+  const auto dr = difference_jacobians(t);
+  if (!dr) return std::nullopt;
+  MatrixXd out = MatrixXd::Zero(num_residuals_, num_parameters());
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < noise_.size(); ++i) {
+    out.middleRows(row, noise_[i].num_rows()) =
+        noise_[i].whitened_jacobian(evaluation_.differences[i], evaluation_.tracks[i], (*dr)[i]);
+    row += noise_[i].num_rows();
+  }
+  for (int k = 0; k < num_parameters(); ++k)
+    if (const auto& prior = parametrisation_.variables()[k].prior_sigma) out(row++, k) = 1 / *prior;
+  return out;
+}
+
+std::optional<FitProblem::Linearised> FitProblem::linearised(const VectorXd& t) {
+  const auto dr = difference_jacobians(t);
+  if (!dr) return std::nullopt;
+  Linearised out{evaluation_.residuals, MatrixXd::Zero(num_residuals_, num_parameters())};
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < noise_.size(); ++i) {
+    const Eigen::Index n = noise_[i].num_rows();
+    out.residuals.segment(row, n) =
+        noise_[i].weighted_residual(evaluation_.differences[i], evaluation_.tracks[i]);
+    out.jacobian.middleRows(row, n) = noise_[i].weighted_jacobian(evaluation_.tracks[i], (*dr)[i]);
+    row += n;
+  }
+  for (int k = 0; k < num_parameters(); ++k)
+    if (const auto& prior = parametrisation_.variables()[k].prior_sigma) out.jacobian(row++, k) = 1 / *prior;
+  return out;
+}
+
+std::optional<VectorXd> FitProblem::gradient(const VectorXd& t) {
+  if (evaluate(t).failed) return std::nullopt;
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<VectorXd> weights(frames() + 1);
+  for (int f = 0; f <= frames(); ++f) weights[f] = VectorXd::Zero(prediction_->size(f));
+  for (std::size_t i = 0; i < compared_.size(); ++i)
+    for (std::size_t j = 0; j < compared_[i].frames.size(); ++j)
+      weights[compared_[i].frames[j]].segment<2>(output_row_[i][j]) =
+          -evaluation_.tracks[i].gradient.segment<2>(2 * j);
+  VectorXd out;
+  try {
+    const adjoint::AdjointResult sweep =
+        adjoint::adjoint_sweep(model_.model(), native_, trajectory_, *prediction_, weights);
+    out = parametrisation_.native_directions(model_, t).transpose() * sweep.native_bar;
+  } catch (const adjoint::GradientError& error) {
+    evaluation_.failure = error.what();
+    return std::nullopt;
+  }
+  for (int k = 0; k < num_parameters(); ++k)
+    if (const auto& prior = parametrisation_.variables()[k].prior_sigma)
+      out[k] += (t[k] - parametrisation_.initial()[k]) / (*prior * *prior);
+  ++counters_.adjoint_sweeps;
+  counters_.adjoint_seconds.push_back(
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  return out;
+}
+
+}  // namespace rhytid::fitting

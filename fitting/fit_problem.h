@@ -1,0 +1,125 @@
+// The objective of a fit: forward run, projection, whitening; and its derivatives by the tangent or the
+// adjoint sweep of the same run.
+//
+//   F(t) = Σ_tracks cost(observed − predicted(t)) + ½ Σ ((t_k − t_k,initial) / prior_k)²
+//   residuals z with F = ½|z|²;  rows: tracks one after the other, then priors
+//
+// The last run is kept: value, Jacobian and gradient at the same t share it.
+// Tests: tests/fitting/fit_test.cpp
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fitting/parametrisation.h"
+#include "fitting/projected_points.h"
+#include "fitting/registration.h"
+#include "fitting/track_noise.h"
+#include "sim/time/simulate.h"
+
+namespace rhytid::fitting {
+
+/// How well one set of values predicts; failed means that the run did not complete or a point left the view.
+struct FitEvaluation {
+  bool failed = true;
+  std::string failure;  ///< one sentence when failed
+  double cost = 0;
+  VectorXd residuals;                          ///< z [num_residuals]
+  std::vector<VectorXd> differences;           ///< per track: observed − predicted [2n], px
+  std::vector<TrackNoise::Evaluation> tracks;  ///< per track
+};
+
+/// Called after every forward run.
+struct FitProgress {
+  int forward_runs = 0;
+  double cost = 0, seconds = 0;  ///< of this run
+  bool failed = false;
+  std::string failure;
+  VectorXd values;  ///< parameters, internal units
+};
+
+class FitProblem {
+ public:
+  /// Registers the tracks of `camera` and builds the model. `last_frame` 0 and frames beyond the scene's
+  /// last end there. Throws InputError when nothing is left to compare or times contradict the frame rate.
+  FitProblem(const Scene& scene, const FitCase& fit, const Camera& camera, const TrackSet& tracks);
+
+  const Parametrisation& parametrisation() const { return parametrisation_; }
+  int num_parameters() const { return parametrisation_.size(); }
+  int num_residuals() const { return num_residuals_; }
+  int num_observations() const { return num_observations_; }  ///< pixels compared (two numbers each)
+  int degrees_of_freedom() const;                             ///< independent residuals minus parameters
+  int frames() const { return options_.frames; }
+  const Registration& registration() const { return registration_; }
+  const SceneModel& scene_model() const { return model_; }
+  const RunOptions& run_options() const { return options_; }
+  const ProjectedPoints& prediction() const { return *prediction_; }
+
+  /// Forward run at t, or the kept one when t is the same to the last bit.
+  const FitEvaluation& evaluate(const VectorXd& t);
+  /// ∂z/∂t [num_residuals][num_parameters]; nothing (and `failure` of the evaluation set) when the run failed
+  /// or cannot be differentiated.
+  std::optional<MatrixXd> jacobian(const VectorXd& t);
+  /// ∂F/∂t by the adjoint sweep; nothing as above.
+  std::optional<VectorXd> gradient(const VectorXd& t);
+  /// Residuals and Jacobian whitened with robust weights held fixed, for covariance estimates.
+  struct Linearised {
+    VectorXd residuals;
+    MatrixXd jacobian;
+  };
+  std::optional<Linearised> linearised(const VectorXd& t);
+
+  /// Compared observations of a track in the order of its differences.
+  struct ComparedTrack {
+    int track;  ///< index into the TrackSet
+    std::vector<int> frames;
+    std::vector<Vec2> observed;
+  };
+  const std::vector<ComparedTrack>& compared() const { return compared_; }
+  const std::vector<TrackNoise>& noise() const { return noise_; }
+
+  struct Counters {
+    int forward_runs = 0, failed_runs = 0, tangent_sweeps = 0, adjoint_sweeps = 0;
+    std::vector<double> forward_seconds, tangent_seconds, adjoint_seconds;
+  };
+  const Counters& counters() const { return counters_; }
+  /// Lowest cost of all evaluations so far and where; empty vector before the first that did not fail.
+  const VectorXd& best() const { return best_; }
+  double best_cost() const { return best_cost_; }
+
+  std::function<void(const FitProgress&)> on_run;  ///< after every forward run
+  std::function<bool()> should_stop;               ///< polled inside runs; true makes the run fail
+  bool was_stopped() const { return was_stopped_; }
+
+ private:
+  void choose_observations(const TrackSet& tracks, const FitCase& fit, const std::string& camera);
+  void run(const VectorXd& t);
+  void compare();
+  bool is_current(const VectorXd& t) const { return t_.size() == t.size() && t_ == t; }
+  /// ∂(observed − predicted)/∂t per track, [2n][parameters].
+  std::optional<std::vector<MatrixXd>> difference_jacobians(const VectorXd& t);
+
+  Parametrisation parametrisation_;
+  SceneModel model_;
+  RunOptions options_;
+  Registration registration_;
+  std::vector<ComparedTrack> compared_;
+  std::vector<TrackNoise> noise_;
+  std::optional<ProjectedPoints> prediction_;
+  /// Row of (track, observation) in its frame's output, in the order of compared_.
+  std::vector<std::vector<int>> output_row_;
+  int num_residuals_ = 0, num_observations_ = 0;
+
+  VectorXd t_, native_;
+  Trajectory trajectory_;
+  FitEvaluation evaluation_;
+  std::optional<std::vector<MatrixXd>> difference_jacobians_;  ///< at t_
+  VectorXd best_;
+  double best_cost_ = 0;
+  Counters counters_;
+  bool was_stopped_ = false;
+};
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,148 @@
+#include "fitting/identifiability.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <numeric>
+
+#include "sim/core/error.h"
+
+namespace rhytid::fitting {
+namespace {
+
+/// Singular values below this part of the largest are zero within the accuracy of the tangent sweep.
+constexpr double kNullTolerance = 1e-8;
+/// Components of a unit direction below this are left out of sentences.
+constexpr double kMentioned = 0.25;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::string format(const char* pattern, double x) {
+  char text[64];
+  std::snprintf(text, sizeof(text), pattern, x);
+  return text;
+}
+
+}  // namespace
+
+Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<FitVariable>& variables,
+                                 double widening)
+    : variables_(variables), scale_(VectorXd::Ones(jacobian.cols())), widening_(widening) {
+  const int n = static_cast<int>(jacobian.cols());
+  require(n == static_cast<int>(variables.size()), "Identifiability: one variable per column");
+  require(jacobian.rows() >= n && jacobian.allFinite(), "Identifiability: Jacobian is wide or not finite");
+  for (int k = 0; k < n; ++k)
+    if (variables[k].transform == ParameterTransform::none)
+      scale_[k] = variables[k].upper - variables[k].lower;
+  const Eigen::JacobiSVD<MatrixXd> svd(jacobian * scale_.asDiagonal(), Eigen::ComputeThinV);
+  singular_values_ = svd.singularValues();
+  right_vectors_ = svd.matrixV();
+  for (int i = 0; i < n; ++i) {
+    if (singular_values_[i] > kNullTolerance * singular_values_[0]) ++rank_;
+    Eigen::Index largest;  // the sign of a singular vector is free: make its largest component positive
+    right_vectors_.col(i).cwiseAbs().maxCoeff(&largest);
+    if (right_vectors_(largest, i) < 0) right_vectors_.col(i) *= -1;
+  }
+}
+
+double Identifiability::sigma(const VectorXd& g) const {
+  const VectorXd part = right_vectors_.transpose() * scale_.cwiseProduct(g);
+  double variance = 0;
+  for (int i = 0; i < part.size(); ++i) {
+    if (i < rank_)
+      variance += std::pow(part[i] / singular_values_[i], 2);
+    else if (std::fabs(part[i]) > 1e-6 * scale_.cwiseProduct(g).norm())
+      return kInfinity;
+  }
+  return widening_ * std::sqrt(variance);
+}
+
+double Identifiability::sigma(int parameter) const {
+  return sigma(VectorXd::Unit(scale_.size(), parameter));
+}
+
+MatrixXd Identifiability::correlation() const {
+  const Eigen::Index n = scale_.size();
+  MatrixXd covariance = MatrixXd::Zero(n, n);
+  for (int i = 0; i < rank_; ++i)
+    covariance +=
+        right_vectors_.col(i) * right_vectors_.col(i).transpose() / std::pow(singular_values_[i], 2);
+  MatrixXd result = MatrixXd::Identity(n, n);
+  for (Eigen::Index a = 0; a < n; ++a)
+    for (Eigen::Index b = 0; b < n; ++b) {
+      if (a == b) continue;
+      const bool finite =
+          std::isfinite(sigma(static_cast<int>(a))) && std::isfinite(sigma(static_cast<int>(b)));
+      result(a, b) = finite ? covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b))
+                            : std::numeric_limits<double>::quiet_NaN();
+    }
+  return result;
+}
+
+bool Identifiability::determined(int parameter) const {
+  const double limit = variables_[parameter].transform == ParameterTransform::none ? 0.25 : 1.0;
+  return sigma(parameter) <= limit * scale_[parameter];
+}
+
+std::string Identifiability::direction_in_words(int i) const {
+  const VectorXd v = right_vectors_.col(i);
+  std::vector<int> order(v.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return std::fabs(v[a]) > std::fabs(v[b]); });
+  std::string up, down;
+  int mentioned = 0;
+  for (const int k : order) {
+    if (std::fabs(v[k]) < kMentioned) continue;
+    std::string& list = v[k] > 0 ? up : down;
+    list += (list.empty() ? "" : ", ") + variables_[k].name;
+    ++mentioned;
+  }
+  const std::string effect = i >= rank_ ? " changes no tracked feature."
+                                        : " by 10 % changes all tracked features together by only " +
+                                              format("%.2g", 0.1 * singular_values_[i] / widening_) +
+                                              " standard deviations.";
+  if (mentioned == 1) return up + " is not determined: changing it" + effect;
+  if (down.empty()) return up + " go together: raising all of them" + effect;
+  return up + " trade off against " + down + ": raising the former while lowering the latter" + effect;
+}
+
+std::vector<std::string> Identifiability::cannot_tell() const {
+  std::vector<std::string> sentences;
+  for (int i = static_cast<int>(singular_values_.size()) - 1; i >= 0; --i)  // the worst first
+    if (i >= rank_ || widening_ / singular_values_[i] > 1) sentences.push_back(direction_in_words(i));
+  for (int k = 0; k < scale_.size(); ++k) {
+    if (determined(k)) continue;
+    const double s = sigma(k) / scale_[k];
+    const bool is_plain = variables_[k].transform == ParameterTransform::none;
+    sentences.push_back("This footage does not determine " + variables_[k].name + ": " +
+                        (std::isfinite(s) ? "its standard deviation is " +
+                                                (is_plain ? format("%.2g", s) + " of the allowed range"
+                                                          : "a factor of " + format("%.2g", std::exp(s)))
+                                          : "any value fits") +
+                        ".");
+  }
+  return sentences;
+}
+
+double student_quantile_975(int degrees_of_freedom) {
+  const double z = 1.959963984540054, v = std::max(1, degrees_of_freedom);
+  const double z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
+  return z + (z3 + z) / (4 * v) + (5 * z5 + 16 * z3 + 3 * z) / (96 * v * v) +
+         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * v * v * v);
+}
+
+double lag_one_autocorrelation(const std::vector<MatrixXd>& series,
+                               const std::vector<std::vector<int>>& frames) {
+  double products = 0, squares = 0;
+  for (std::size_t k = 0; k < series.size(); ++k)
+    for (Eigen::Index j = 0; j + 1 < series[k].rows(); ++j) {
+      if (frames[k][j + 1] != frames[k][j] + 1) continue;
+      products += series[k].row(j).dot(series[k].row(j + 1));
+      squares += 0.5 * (series[k].row(j).squaredNorm() + series[k].row(j + 1).squaredNorm());
+    }
+  return squares > 0 ? products / squares : 0;
+}
+
+}  // namespace rhytid::fitting

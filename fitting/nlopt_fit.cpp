@@ -1,0 +1,122 @@
+#include <chrono>
+#include <cmath>
+#include <nlopt.hpp>
+
+#include "fitting/optimise.h"
+
+namespace rhytid::fitting {
+namespace {
+
+/// F over y with t = start + scale ∘ y, divided by its first value so that tolerances are relative.
+struct ScaledObjective {
+  FitProblem& problem;
+  const FitIterationCallback& callback;
+  VectorXd start, scale;
+  double unit = 1;
+  std::vector<FitIteration>& history;
+  std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+  VectorXd last_t = {};
+
+  VectorXd t_of(const std::vector<double>& y) const {
+    const VectorXd moved = start + scale.cwiseProduct(Eigen::Map<const VectorXd>(y.data(), y.size()));
+    const Parametrisation& p = problem.parametrisation();
+    return moved.cwiseMax(p.lower()).cwiseMin(p.upper());
+  }
+
+  /// Beyond the feasible region: higher than the best by a slope that leads back to it.
+  double wall(const VectorXd& t, std::vector<double>& gradient) const {
+    const VectorXd from_best = (t - problem.best()).cwiseQuotient(scale);
+    for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k] = 2 * from_best[k];
+    return 2 * problem.best_cost() / unit + 1 + from_best.squaredNorm();
+  }
+
+  double operator()(const std::vector<double>& y, std::vector<double>& gradient) {
+    const VectorXd t = t_of(y);
+    const FitEvaluation& evaluation = problem.evaluate(t);
+    if (problem.was_stopped()) throw nlopt::forced_stop();
+    if (evaluation.failed) return wall(t, gradient);
+    const double cost = evaluation.cost;
+    double norm = 0;
+    if (!gradient.empty()) {
+      const std::optional<VectorXd> g = problem.gradient(t);
+      if (!g) return wall(t, gradient);
+      norm = g->norm();
+      for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k] = (*g)[k] * scale[k] / unit;
+    }
+    const VectorXd values = problem.parametrisation().values(t);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    history.push_back({.iteration = static_cast<int>(history.size()),
+                       .evaluations = problem.counters().forward_runs,
+                       .cost = cost,
+                       .gradient_norm = norm,
+                       .step_norm = last_t.size() > 0 ? (t - last_t).norm() : 0,
+                       .seconds = seconds.count(),
+                       .values = {values.begin(), values.end()}});
+    last_t = t;
+    if (callback) callback(history.back());
+    return cost / unit;
+  }
+
+  static double call(const std::vector<double>& y, std::vector<double>& gradient, void* self) {
+    return (*static_cast<ScaledObjective*>(self))(y, gradient);
+  }
+};
+
+}  // namespace
+
+OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& options,
+                                const FitIterationCallback& callback) {
+  using Status = OptimiserOutcome::Status;
+  OptimiserOutcome outcome;
+  outcome.t = problem.parametrisation().initial();
+  const int n = problem.num_parameters();
+  const FitEvaluation& first = problem.evaluate(outcome.t);
+  const std::optional<MatrixXd> jacobian = problem.jacobian(outcome.t);
+  if (!jacobian) {
+    outcome.status = problem.was_stopped() ? Status::stopped : Status::failed;
+    outcome.detail = "the first forward run failed: " + first.failure;
+    return outcome;
+  }
+  ScaledObjective objective{.problem = problem,
+                            .callback = callback,
+                            .start = outcome.t,
+                            .scale = VectorXd::Ones(n),
+                            .unit = std::max(first.cost, 1e-300),
+                            .history = outcome.history};
+  // A unit step then changes F by about its first value: Hessian diagonal JᵀJ scaled to 2F.
+  for (int k = 0; k < n; ++k) {
+    const double norm = jacobian->col(k).norm();
+    if (norm > 0) objective.scale[k] = std::min(1.0, std::sqrt(2 * first.cost) / norm);
+  }
+  nlopt::opt optimiser(nlopt::LD_SLSQP, n);
+  std::vector<double> lower(n), upper(n), y(n, 0.0);
+  for (int k = 0; k < n; ++k) {
+    lower[k] = (problem.parametrisation().lower()[k] - outcome.t[k]) / objective.scale[k];
+    upper[k] = (problem.parametrisation().upper()[k] - outcome.t[k]) / objective.scale[k];
+  }
+  optimiser.set_lower_bounds(lower);
+  optimiser.set_upper_bounds(upper);
+  optimiser.set_min_objective(ScaledObjective::call, &objective);
+  optimiser.set_ftol_rel(options.relative_decrease);
+  optimiser.set_xtol_rel(options.step_tolerance);
+  optimiser.set_maxeval(options.max_evaluations);
+  double minimum = 0;
+  try {
+    const nlopt::result result = optimiser.optimize(y, minimum);
+    outcome.status = result == nlopt::MAXEVAL_REACHED ? Status::max_evaluations : Status::converged;
+    outcome.detail = "NLopt result " + std::to_string(static_cast<int>(result));
+  } catch (const nlopt::forced_stop&) {
+    outcome.status = Status::stopped;
+    outcome.detail = "stopped";
+  } catch (const nlopt::roundoff_limited&) {
+    outcome.status = Status::converged;  // no further decrease within rounding
+    outcome.detail = "limited by rounding";
+  } catch (const std::runtime_error& error) {
+    outcome.status = Status::failed;
+    outcome.detail = std::string("NLopt: ") + error.what();
+  }
+  outcome.t = problem.best();
+  return outcome;
+}
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,57 @@
+#include "fitting/projected_points.h"
+
+#include "sim/core/error.h"
+
+namespace rhytid::fitting {
+
+ProjectedPoints::ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points,
+                                 Camera camera, std::vector<std::vector<int>> points_in_frame)
+    : interpolation_(mesh, std::move(points)),
+      camera_(std::move(camera)),
+      points_in_frame_(std::move(points_in_frame)) {
+  for (const std::vector<int>& list : points_in_frame_)
+    for (const int i : list)
+      require(i >= 0 && i < interpolation_.num_points(), "ProjectedPoints: point index out of range");
+}
+
+const std::vector<int>& ProjectedPoints::points_in(int frame) const {
+  static const std::vector<int> none;
+  return frame >= 0 && frame < static_cast<int>(points_in_frame_.size()) ? points_in_frame_[frame] : none;
+}
+
+int ProjectedPoints::size(int frame) const {
+  return 2 * static_cast<int>(points_in(frame).size());
+}
+
+VectorXd ProjectedPoints::values(int frame, const State& state) const {
+  VectorXd out(size(frame));
+  Eigen::Index row = 0;
+  for (const int i : points_in(frame)) {
+    out.segment<2>(row) = camera_.project(interpolation_.position(i, state.u));
+    row += 2;
+  }
+  return out;
+}
+
+MatrixXd ProjectedPoints::tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd&) const {
+  MatrixXd out(size(frame), du.cols());
+  Eigen::Index row = 0;
+  for (const int i : points_in(frame)) {
+    out.middleRows<2>(row) =
+        camera_.projection_jacobian(interpolation_.position(i, state.u)) * interpolation_.tangent(i, du);
+    row += 2;
+  }
+  return out;
+}
+
+void ProjectedPoints::adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+                              VectorXd&) const {
+  Eigen::Index row = 0;
+  for (const int i : points_in(frame)) {
+    const auto jacobian = camera_.projection_jacobian(interpolation_.position(i, state.u));
+    interpolation_.adjoint(i, jacobian.transpose() * weights.segment<2>(row), u_bar);
+    row += 2;
+  }
+}
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,40 @@
+// Where a camera sees material points of the skin, frame by frame: the prediction that tracks are compared
+// with.
+//   pixel = project(X(u, v) + Σ_a P_a(u, v) u_a)
+// Tests: tests/fitting/registration_test.cpp
+#pragma once
+
+#include <vector>
+
+#include "adjoint/outputs.h"
+#include "fitting/cameras.h"
+
+namespace rhytid::fitting {
+
+/// Pixels of chosen points in chosen frames; values are [x0 y0 x1 y1 ...] in the order of the frame's list.
+class ProjectedPoints final : public adjoint::Output {
+ public:
+  /// `points_in_frame[f]` lists indices of `points` wanted in frame f; frames beyond the list want none.
+  /// Throws ContractError on indices out of range.
+  ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points, Camera camera,
+                  std::vector<std::vector<int>> points_in_frame);
+
+  int size(int frame) const override;
+  /// px; NaN for a point behind the camera.
+  VectorXd values(int frame, const State& state) const override;
+  MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const override;
+  void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+               VectorXd& s_bar) const override;
+
+  const adjoint::PointInterpolation& interpolation() const { return interpolation_; }
+  const Camera& camera() const { return camera_; }
+  /// The list given for a frame; empty beyond.
+  const std::vector<int>& points_in(int frame) const;
+
+ private:
+  adjoint::PointInterpolation interpolation_;
+  Camera camera_;
+  std::vector<std::vector<int>> points_in_frame_;
+};
+
+}  // namespace rhytid::fitting

@@ -1,0 +1,68 @@
+// How far the observations of one track are from a prediction, in units of their noise.
+//
+// The material point was attached where the track was seen in frame 0, so the error o of that first pixel
+// shifts every later frame of the track alike. With r_f = observed_f − predicted_f, f = 1..n:
+//   r_f = o + e_f,   o ~ N(0, C_0),   e_f ~ N(0, C_f)        (the deformation between frames acts on o as 1)
+//   cost(r) = min_o ½ Σ_f ρ(|C_f^{−1/2} (r_f − o)|²) + ½ oᵀ C_0^{−1} o
+// Without robust loss (ρ(s) = s) this is exactly ½ rᵀ Σ^{−1} r with the joint covariance
+// Σ = diag(C_f) + (1 1ᵀ) ⊗ C_0; with it (Huber: ρ = s up to k², 2 k √s − k² beyond) one bad frame is
+// discounted without leaking into the others through the common shift.
+//
+// Source   marginalisation by variable projection (Golub and Pereyra 1973).   Units px.
+// Tests    tests/fitting/track_noise_test.cpp
+#pragma once
+
+#include <vector>
+
+#include "sim/core/types.h"
+
+namespace rhytid::fitting {
+
+/// The noise model of one track. Immutable.
+class TrackNoise {
+ public:
+  /// Covariances in px²: of the first frame and of each later one used. Throws ContractError when one is not
+  /// positive definite. `huber` is k in standard deviations, 0 = plain least squares.
+  TrackNoise(const Eigen::Matrix2d& first, const std::vector<Eigen::Matrix2d>& later, double huber);
+
+  int num_observations() const { return static_cast<int>(roots_.size()); }
+  /// Whitened values per track: two per observation and two for the shift.
+  int num_rows() const { return 2 * num_observations() + 2; }
+
+  struct Evaluation {
+    VectorXd whitened;  ///< [num_rows] z with ½|z|² = cost
+    double cost = 0;
+    VectorXd gradient;            ///< [2n] ∂cost/∂r, 1/px
+    std::vector<double> weights;  ///< [n] of the robust loss, 1 = full
+    Vec2 shift = Vec2::Zero();    ///< o, px
+  };
+  /// r is [2n] px.
+  Evaluation evaluate(const VectorXd& r) const;
+
+  /// Exact derivative of z along columns dr [2n][k], the shift's included. Its product with z is the
+  /// gradient, its normal matrix without robust loss is drᵀ Σ^{−1} dr.
+  MatrixXd whitened_jacobian(const VectorXd& r, const Evaluation& at, const MatrixXd& dr) const;
+
+  /// dr and r whitened with the robust weights held fixed: what covariance estimates want. Each
+  /// [num_rows][k].
+  MatrixXd weighted_jacobian(const Evaluation& at, const MatrixXd& dr) const;
+  VectorXd weighted_residual(const VectorXd& r, const Evaluation& at) const;
+
+  /// Innovations [n][2]: every observation against what the earlier ones of the track predict, in standard
+  /// deviations. White when the model and the covariances are right.
+  MatrixXd innovations(const VectorXd& r, const Evaluation& at) const;
+
+ private:
+  Vec2 best_shift(const VectorXd& r, std::vector<double>& weights) const;
+  /// Subtracts from each column its part along the columns of `basis` (num_rows × 2).
+  static MatrixXd without(const MatrixXd& basis, MatrixXd columns);
+
+  std::vector<Eigen::Matrix2d> roots_;  ///< C_f^{−1/2}: inverse lower Cholesky factors
+  Eigen::Matrix2d first_, first_root_;
+  double huber_;
+};
+
+/// The covariance with both standard deviations raised to at least min_sigma (px).
+Eigen::Matrix2d with_floor(const Eigen::Matrix2d& covariance, double min_sigma);
+
+}  // namespace rhytid::fitting
