@@ -68,6 +68,23 @@ NoiseCheck check_noise(FitProblem& problem, const FitEvaluation& at, const Vecto
   return check;
 }
 
+/// Truth in the units of the held modulus: displacements only tell stiffnesses relative to it.
+std::map<std::string, double> truth_in_gauge(const FitInput& input, const Parametrisation& p,
+                                             FitResult& result) {
+  std::map<std::string, double> truth = input.truth;
+  const std::string gauge = "/skin/layers/" + p.gauge_layer() + "/youngs_modulus";
+  const auto known = truth.find(gauge);
+  if (known == truth.end() || p.modulus_variable(p.gauge_layer()) >= 0) return truth;
+  const double factor = get_parameter(input.scene, gauge) / known->second;
+  if (std::fabs(factor - 1) < 1e-12) return truth;
+  for (auto& [address, value] : truth)
+    if (address.ends_with("/youngs_modulus") || address.ends_with("/stiffness")) value *= factor;
+  result.notes.push_back("True stiffnesses were multiplied by " + number("%.6g", factor) +
+                         " for the comparison: the truth's modulus of layer " + p.gauge_layer() +
+                         " is not the one held.");
+  return truth;
+}
+
 void add_modulus_ratios(const FitProblem& problem, const Identifiability& found, const VectorXd& t,
                         double quantile, const std::map<std::string, double>& truth, FitResult& result) {
   const Parametrisation& p = problem.parametrisation();
@@ -220,13 +237,14 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
     result.final_cost = problem.best_cost();
   }
   add_notes(problem, input, at, result);
+  const std::map<std::string, double> truth = truth_in_gauge(input, problem.parametrisation(), result);
   if (linearised) {
     const NoiseCheck noise = check_noise(problem, *at, linearised->residuals);
     result.reduced_chi_square = noise.reduced_chi_square;
     const Identifiability found(linearised->jacobian, problem.parametrisation().variables(), noise.widening);
     const double quantile = student_quantile_975(problem.degrees_of_freedom());
-    add_parameters(problem, t, &found, quantile, input.truth, result);
-    add_modulus_ratios(problem, found, t, quantile, input.truth, result);
+    add_parameters(problem, t, &found, quantile, truth, result);
+    add_modulus_ratios(problem, found, t, quantile, truth, result);
     result.singular_values = found.singular_values();
     result.right_vectors = found.right_vectors();
     result.correlation = found.correlation();
@@ -238,7 +256,7 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
                            ", lag-1 autocorrelation of whitened residuals within tracks " +
                            number("%.3f", noise.autocorrelation) + ").");
   } else {
-    add_parameters(problem, t, nullptr, 0, input.truth, result);
+    add_parameters(problem, t, nullptr, 0, truth, result);
     result.notes.push_back("No intervals: the run at the last values could not be differentiated.");
   }
   result.forward_runs = problem.counters().forward_runs;

@@ -18,7 +18,9 @@ struct FitInput {
   Camera camera;
   TrackSet tracks;
   FitCase options;
-  std::map<std::string, double> truth;  ///< address by names → value, internal units; empty for real footage
+  /// Address by names → value, internal units; empty for real footage. Where the truth's gauge modulus is not
+  /// the one held, stiffnesses are compared per unit of it (the footage cannot tell more).
+  std::map<std::string, double> truth;
 };
 
 struct FitObserver {
@@ -32,8 +34,9 @@ struct FitObserver {
 /// that cannot be fitted; a forward model that fails or an optimiser that runs out is a status.
 FitResult run_fit(const FitInput& input, const FitObserver& observer = {});
 
-/// Truth values from truth.json, {"parameters": {address: number or quantity with unit}}; keys are rewritten
-/// to names. Addresses that the scene does not have are left out. Throws InputError on anything malformed.
+/// Truth values from the truth.json that `rhytid render` writes: {"parameters": [{"address", "value"}, ...]},
+/// addresses by names, internal units. Addresses that the scene does not have are left out. Throws InputError
+/// on anything malformed.
 std::map<std::string, double> read_truth(const std::string& path, const Scene& scene);
 
 /// The answer as text: a table of parameter, initial, fitted, 95 % interval and, where known, truth, error

@@ -5,7 +5,6 @@
 
 #include "fitting/fit.h"
 #include "sim/core/error.h"
-#include "sim/core/units.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/parameter.h"
 
@@ -84,24 +83,21 @@ std::string answer_text(const FitResult& result) {
 }
 
 std::map<std::string, double> read_truth(const std::string& path, const Scene& scene) {
+  const std::string expected = "{\"parameters\": [{\"address\": \"/...\", \"value\": number}, ...]}";
   const nlohmann::json json = nlohmann::json::parse(read_file(path), nullptr, false);
-  if (json.is_discarded()) throw InputError(path, "no JSON", "{\"parameters\": {address: value}}");
-  if (!json.is_object() || !json.contains("parameters") || !json["parameters"].is_object())
-    throw InputError(path, "no object 'parameters'", "{\"parameters\": {address: value}}");
+  if (json.is_discarded()) throw InputError(path, "no JSON", expected);
+  if (!json.is_object() || !json.contains("parameters") || !json["parameters"].is_array())
+    throw InputError(path, "no list 'parameters'", expected);
+  const std::vector<ParameterSpec> known = all_parameters(scene);
   std::map<std::string, double> truth;
-  for (const auto& [address, value] : json["parameters"].items()) {
-    ParameterSpec spec;
-    try {
-      spec = describe_parameter(scene, address);
-    } catch (const InputError&) {
-      continue;  // the true scene may have what the fitted one lacks
-    }
-    if (value.is_number())
-      truth[spec.address] = value.get<double>();
-    else if (value.is_string())
-      truth[spec.address] = parse_quantity(value.get<std::string>(), spec.dimension, path + ": " + address);
-    else
-      throw InputError(path + ": " + address, value.dump(), "a number or a quantity");
+  for (const nlohmann::json& item : json["parameters"]) {
+    if (!item.is_object() || !item.contains("address") || !item["address"].is_string() ||
+        !item.contains("value") || !item["value"].is_number())
+      throw InputError(path, item.dump(), expected);
+    const std::string address = item["address"];
+    // The true scene may have what the fitted one lacks.
+    if (std::any_of(known.begin(), known.end(), [&](const ParameterSpec& s) { return s.address == address; }))
+      truth[address] = item["value"];
   }
   return truth;
 }
