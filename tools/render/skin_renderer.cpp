@@ -182,7 +182,7 @@ Vec3 SkinRenderer::skin_colour(const Lit& lit, size_t index) const {
 
 Vec3 SkinRenderer::finger_colour(const Lit&, const Finger& finger, const Vec3& point) const {
   const Vec3 normal = (point - finger.axis_point(point)).normalized();
-  const Vec3 albedo = finger_texture_.albedo(point - finger.tip).cwiseProduct(Vec3(1.08, 0.90, 0.86));
+  const Vec3 albedo = finger_texture_.albedo(point - finger.tip, false).cwiseProduct(Vec3(1.10, 0.84, 0.80));
   // The under side sees skin, not sky.
   const double open = 0.35 + 0.65 * smoothstep(-0.9, 0.6, normal.dot(up_));
   return shaded(albedo, point, normal, open, smoothstep(-0.5, 0.2, normal.dot(light_)), 0.06);

@@ -94,31 +94,33 @@ SkinTexture::SkinTexture(double scale, double footprint, std::uint32_t seed)
   }
 }
 
-Vec3 SkinTexture::albedo(const Vec3& X) const {
+Vec3 SkinTexture::albedo(const Vec3& X, bool has_spots) const {
   const Vec3 p = X / scale_ + Vec3::Constant(seed_shift_);
-  double grain = 0, blotch = 0;
+  double grain = 0, blotch = 0, fine = 0;
   for (int i = 0; i < 6; ++i) {
     if (weights_[i] == 0) continue;
     const double n = gradient_noise(std::exp2(i - 3) * p + Vec3::Constant(17.3 * i), seed_ + 31u * i);
     grain += weights_[i] * n;
     if (i < 2) blotch += n;
+    if (i == 4) fine = n;
   }
-  const double bend = 0.35 * gradient_noise(0.6 * p + Vec3(5, 9, 2), seed_ + 977u);
-  const Cells cells = voronoi(Vec3(p.x() / 1.9 + bend, p.y() / 1.5 - bend, p.z() / 1.7), seed_ + 7919u);
-  const double furrow = 1 - smoothstep(0.0, 0.16, cells.second - cells.nearest);
-  // A third of the cells have a pore, one in fifty a mole.
+  // Bent walls of uneven depth: furrows run out and meet, unlike cracks.
+  const double bend = 0.45 * gradient_noise(0.6 * p + Vec3(5, 9, 2), seed_ + 977u) + 0.10 * fine;
+  const Cells cells = voronoi(Vec3(p.x() / 1.25 + bend, p.y() / 0.95 - bend, p.z() / 1.1), seed_ + 7919u);
+  const double depth = std::clamp(0.55 + 0.5 * blotch + 0.5 * fine, 0.1, 1.0);
+  const double furrow = depth * (1 - smoothstep(0.0, 0.30, cells.second - cells.nearest));
+  // One cell in seven has a pore, one in three hundred a mole.
   const double chance = (cells.nearest_hash & 0xffff) / 65536.0,
-               size = 0.12 + 0.14 * (cells.nearest_hash >> 16) / 65536.0;
-  double spot = 0;
-  if (chance < 0.35) spot = 0.55 * std::exp(-0.5 * std::pow(cells.nearest / size, 2));
-  double mole = 0;
-  if (chance > 0.98) mole = 1 - smoothstep(0.28, 0.5, cells.nearest);
+               size = 0.14 + 0.16 * (cells.nearest_hash >> 16) / 65536.0;
+  double spot = 0, mole = 0;
+  if (has_spots && chance < 0.14) spot = 0.5 * std::exp(-0.5 * std::pow(cells.nearest / size, 2));
+  if (has_spots && chance > 0.997) mole = 1 - smoothstep(0.28, 0.55, cells.nearest);
 
-  const double light = std::exp(grain) * (1 - 0.24 * furrow) * (1 - spot) * (1 - 0.55 * mole);
-  const Vec3 base(0.64, 0.40, 0.295);  // linear reflectance of fair skin
+  const double light = std::exp(grain) * (1 - 0.26 * furrow) * (1 - spot) * (1 - 0.55 * mole);
+  const Vec3 base(0.60, 0.375, 0.28);  // linear reflectance of fair skin
   // What darkens skin is blood and melanin: blue and green fall faster than red.
   return Vec3(base.x() * std::pow(light, 0.8), base.y() * light, base.z() * std::pow(light, 1.15))
-      .cwiseProduct(Vec3(1 + 0.03 * blotch, 1 - 0.05 * blotch, 1 - 0.04 * blotch));
+      .cwiseProduct(Vec3(1 + 0.03 * blotch, 1 - 0.06 * blotch, 1 - 0.05 * blotch));
 }
 
 }  // namespace rhytid::tools

@@ -19,8 +19,8 @@ class SkinTexture {
   /// since they would flicker.
   SkinTexture(double scale, double footprint, std::uint32_t seed);
 
-  /// Reflectance (linear R, G, B in 0..1) at rest position X, mm.
-  Vec3 albedo(const Vec3& X) const;
+  /// Reflectance (linear R, G, B in 0..1) at rest position X, mm. Without `has_spots`, no pores and moles.
+  Vec3 albedo(const Vec3& X, bool has_spots = true) const;
 
  private:
   double scale_, seed_shift_;

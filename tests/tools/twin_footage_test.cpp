@@ -1,0 +1,268 @@
+// A twin experiment's footage end to end: rendered, opened, compared with its own ground truth, tracked.
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <sstream>
+
+#include "fitting/cameras.h"
+#include "fitting/observations.h"
+#include "sim/output/atomic_file.h"
+#include "sim/scene/load.h"
+#include "sim/scene/scene_model.h"
+#include "tools/render/finger.h"
+#include "tools/render/skin_camera.h"
+#include "tools/render/skin_renderer.h"
+#include "tools/render/surface_view.h"
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+std::unique_ptr<Verb> make_verb_render();
+std::unique_ptr<Verb> make_verb_track();
+
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr const char* scene_text = R"({
+  "name": "small",
+  "skin": {
+    "surface": {"grid": {"size": ["16 mm", "12 mm"], "cells": [4, 3]}},
+    "order": 2,
+    "layers": [{"name": "skin", "thickness": "1.5 mm", "order": 1, "youngs_modulus": "50 kPa"}]
+  },
+  "base": {"shape": "plane", "stiffness": "0.1 MPa/mm", "onset": "0.02 mm"},
+  "colliders": [
+    {"name": "finger", "shape": "sphere", "radius": "2 mm", "stiffness": "0.1 MPa/mm", "onset": "0.02 mm",
+     "friction": {"coefficient": 0.8, "slip_speed": "2 mm/s"},
+     "path": [{"time": 0, "position": [-4, -3, 2.02]}, {"time": 0.1, "position": [-4, -3, 1.5]},
+              {"time": 0.3, "position": [-2, -3, 1.5]}]}],
+  "time": {"frame_rate": "20 Hz", "frames": 4}
+})";
+constexpr const char* case_text = R"({
+  "scene": "scene.json",
+  "truth": {"settings": ["/skin/layers/skin/youngs_modulus=80 kPa"]},
+  "render": {"width": 160, "height": 120, "texture_scale": "0.6 mm", "truth_spacing": 8},
+  "track": {"max_tracks": 60, "min_distance": 6}
+})";
+
+struct Outcome {
+  int code;
+  std::string out, err;
+};
+
+Outcome run(const std::vector<std::string>& arguments) {
+  Program program;
+  program.name = "rhytid";
+  program.verbs.push_back(make_verb_render());
+  program.verbs.push_back(make_verb_track());
+  std::vector<const char*> argv = {"rhytid"};
+  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+  std::ostringstream out, err;
+  const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
+  return {code, out.str(), err.str()};
+}
+
+/// One rendered twin for all tests.
+class TwinFootage : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("rhytid_twin_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+    std::ofstream(folder_ / "scene.json") << scene_text;
+    std::ofstream(folder_ / "case.json") << case_text;
+    rendered_ = run({"render", path("case.json"), "-o", path("out"), "--threads", "2"});
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+  void SetUp() override { ASSERT_EQ(rendered_.code, 0) << rendered_.err; }
+
+  static std::string path(const std::string& name) { return (folder_ / name).string(); }
+
+  static inline fs::path folder_;
+  static inline Outcome rendered_;
+};
+
+TEST_F(TwinFootage, VideoOpensWithTheFitsFrames) {
+  cv::VideoCapture video(path("out/footage.avi"));
+  ASSERT_TRUE(video.isOpened());
+  EXPECT_NEAR(video.get(cv::CAP_PROP_FPS), 20, 1e-3);
+  int frames = 0;
+  for (cv::Mat frame; video.read(frame); ++frames) EXPECT_EQ(frame.size(), cv::Size(160, 120));
+  EXPECT_EQ(frames, 5);
+  const auto truth = nlohmann::json::parse(read_file(path("out/truth.json")));
+  double modulus = 0;
+  for (const auto& p : truth["parameters"])
+    if (p["address"] == "/skin/layers/skin/youngs_modulus") modulus = p["value"];
+  EXPECT_EQ(modulus, 0.08);
+}
+
+TEST_F(TwinFootage, MotionIsThatOfTheTruthsRun) {
+  const SceneModel truth(load_scene(path("scene.json"), {"/skin/layers/skin/youngs_modulus=80 kPa"}));
+  const Trajectory run = simulate(truth.model(), truth.native(), truth.run_options());
+  ASSERT_TRUE(run.complete) << run.failure;
+  const MovingSurface surface = read_motion(path("out/truth_motion.bin"));
+  ASSERT_EQ(surface.frames(), 5);
+  const SkinMesh& mesh = truth.model().mesh;
+  double largest = 0;
+  for (int f = 0; f < 5; ++f)
+    for (int face = 0; face < mesh.num_faces; ++face) {
+      const int node = mesh.outer_nodes(face)[0];  // the corner u = v = 0
+      const Vec3 x = mesh.rest.row(node).transpose() + run.at_frame(f).u.segment<3>(3 * node);
+      EXPECT_LT((surface.position({face, 0, 0}, f) - x).norm(), 1e-12);
+      largest = std::max(largest, (x - Vec3(mesh.rest.row(node).transpose())).norm());
+    }
+  EXPECT_GT(largest, 0.3);  // mm: something happens in the footage
+}
+
+TEST_F(TwinFootage, TruthTracksAreExactProjections) {
+  const fitting::TrackSet tracks = fitting::read_tracks(path("out/truth_tracks.csv"));
+  const fitting::Camera camera = fitting::read_camera(path("out/camera.yaml"));
+  const MovingSurface surface = read_motion(path("out/truth_motion.bin"));
+  const SubdividedSurface tessellation(surface.mesh, SurfaceSide::outer, 4);
+  const SurfaceView view(surface, tessellation, camera, 0);
+  const Scene scene = load_scene(path("scene.json"));
+  ASSERT_GT(tracks.tracks.size(), 100u);
+  int ok = 0, covered = 0;
+  for (const fitting::Track& track : tracks.tracks) {
+    const fitting::Observation* first = track.at(0);
+    ASSERT_NE(first, nullptr);
+    if (first->status != fitting::TrackStatus::ok) continue;
+    const auto point = view.pick(first->pixel);
+    ASSERT_TRUE(point);
+    EXPECT_NEAR(first->pixel.x(), std::round(first->pixel.x()), 1e-9);
+    for (const fitting::Observation& o : track.observations) {
+      const Vec3 x = surface.position(*point, o.frame);
+      const Vec3 tip = path_position(scene.colliders[0].path, o.time_s);
+      const Vec3 sight = (x - camera.centre()).normalized();
+      const double clearance = sight.cross(tip - camera.centre()).norm() - 2;
+      if (o.status == fitting::TrackStatus::ok) {
+        ++ok;
+        EXPECT_LT((o.pixel - camera.project(x)).norm(), 1e-9);
+        EXPECT_GE(clearance, -1e-9);
+      } else {
+        covered += o.status == fitting::TrackStatus::occluded ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(ok, 300);
+  EXPECT_GT(covered, 5);
+}
+
+TEST_F(TwinFootage, TrackerFindsTheTruth) {
+  const Outcome tracked = run({"track", path("case.json"), "-o", path("out"), "--threads", "2"});
+  ASSERT_EQ(tracked.code, 0) << tracked.err;
+  EXPECT_THAT(tracked.out, HasSubstr("against the truth: rms"));
+  const auto record = nlohmann::json::parse(read_file(path("out/track.json")));
+  EXPECT_EQ(record["frames_processed"], 5);
+  const auto& error = record["error_against_truth"];
+  EXPECT_GT(error["observations"].get<int>(), 100);
+  EXPECT_EQ(error["off_skin"], 0);
+  EXPECT_LT(error["rms_px"].get<double>(), 0.2) << tracked.out;
+  EXPECT_GT(error["rms_px"].get<double>(), 1e-4);  // 0 would mean that truth was compared with itself
+  EXPECT_TRUE(fs::exists(path("out/overlay.png")));
+}
+
+TEST_F(TwinFootage, VideoWithoutACase) {
+  const Outcome tracked = run({"track", "--video", path("out/footage.avi"), "--roi", "30,20,100,60",
+                               "--max-tracks", "20", "--frames", "3", "-o", path("direct")});
+  ASSERT_EQ(tracked.code, 0) << tracked.err;
+  const fitting::TrackSet tracks = fitting::read_tracks(path("direct/tracks.csv"));
+  ASSERT_FALSE(tracks.tracks.empty());
+  EXPECT_LE(tracks.tracks.size(), 20u);
+  for (const fitting::Track& track : tracks.tracks) {
+    EXPECT_EQ(track.observations.back().frame, 2);
+    EXPECT_GE(track.observations[0].pixel.x(), 30);
+    EXPECT_LT(track.observations[0].pixel.y(), 80);
+  }
+  EXPECT_EQ(run({"track", "-o", path("direct")}).code, 2);
+}
+
+TEST_F(TwinFootage, SameBitsForAnyNumberOfThreads) {
+  const Outcome again = run({"render", path("case.json"), "-o", path("again"), "--threads", "1"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  for (const char* name : {"frame_0000.png", "frame_0002.png", "frame_0004.png", "truth_tracks.csv",
+                           "truth_motion.bin", "footage.avi"})
+    EXPECT_EQ(read_file(path("again/") + name), read_file(path("out/") + name)) << name;
+  const Outcome other =
+      run({"render", path("case.json"), "-o", path("again"), "--keep-motion", "--set", "/render/seed=2"});
+  ASSERT_EQ(other.code, 0) << other.err;
+  EXPECT_NE(read_file(path("again/frame_0002.png")), read_file(path("out/frame_0002.png")));
+}
+
+TEST_F(TwinFootage, FinerTruthKeepsTheFitsFrameTimes) {
+  const std::string settings = R"(/truth/settings=["/time/frame_rate=60 Hz", "/time/frames=6"])";
+  const Outcome fine = run({"render", path("case.json"), "-o", path("fine"), "--set", settings});
+  ASSERT_EQ(fine.code, 0) << fine.err;
+  const MovingSurface surface = read_motion(path("fine/truth_motion.bin"));
+  ASSERT_EQ(surface.frames(), 3);
+  for (int f = 0; f < 3; ++f) EXPECT_NEAR(surface.times[static_cast<size_t>(f)], f / 20.0, 1e-12);
+  const Outcome odd = run({"render", path("case.json"), "-o", path("fine"), "--set",
+                           R"(/truth/settings=["/time/frame_rate=50 Hz"])"});
+  EXPECT_EQ(odd.code, 2);
+  EXPECT_THAT(odd.err, HasSubstr("an integer multiple"));
+}
+
+TEST_F(TwinFootage, DistortedCameraSeesTheSameSkin) {
+  const MovingSurface surface = read_motion(path("out/truth_motion.bin"));
+  const SubdividedSurface tessellation(surface.mesh, SurfaceSide::outer, 8);
+  const Scene scene = load_scene(path("scene.json"));
+  fitting::Camera straight = fitting::read_camera(path("out/camera.yaml")), bent = straight;
+  fitting::RenderCase options{.width = 160, .height = 120, .noise = 0, .texture_scale = 0.6};
+  const Image by_raster = SkinRenderer(surface, tessellation, scene, straight, options).render(3);
+  bent.distortion[0] = 1e-13;  // rays instead of scan conversion, the same picture
+  const Image by_rays = SkinRenderer(surface, tessellation, scene, bent, options).render(3);
+  int different = 0;
+  for (size_t i = 0; i < by_rays.pixels().size(); ++i)
+    different += std::abs(int(by_rays.pixels()[i]) - int(by_raster.pixels()[i])) > 2 ? 1 : 0;
+  EXPECT_LT(different, 60);  // of 57600: pixels on outlines
+  // With real distortion a picture undistorted by OpenCV shows the straight camera's picture again.
+  bent.distortion = {-3, 0, 0, 0, 0};
+  Image warped = SkinRenderer(surface, tessellation, scene, bent, options).render(3);
+  const cv::Mat seen(120, 160, CV_8UC3, warped.pixels().data());
+  const cv::Matx33d K(straight.intrinsics(0, 0), 0, straight.intrinsics(0, 2), 0, straight.intrinsics(1, 1),
+                      straight.intrinsics(1, 2), 0, 0, 1);
+  cv::Mat flat;
+  cv::undistort(seen, flat, K, std::vector<double>{-3, 0, 0, 0, 0});
+  double sum = 0, unwarped = 0;
+  for (int y = 30; y < 90; ++y)
+    for (int x = 40; x < 120; ++x) {
+      sum += std::abs(int(flat.at<cv::Vec3b>(y, x)[0]) - int(by_raster.pixel(x, y)[0]));
+      unwarped += std::abs(int(seen.at<cv::Vec3b>(y, x)[0]) - int(by_raster.pixel(x, y)[0]));
+    }
+  EXPECT_LT(sum / 4800, 4);        // grey levels: the interpolation of the undistortion
+  EXPECT_LT(sum, 0.6 * unwarped);  // the distortion was there
+}
+
+TEST(Finger, RayMeetsTheCapsuleWhereItsDistanceIsTheRadius) {
+  const Finger finger{Vec3(1, 2, 3), Vec3(4, 2, 9), 2};
+  const Vec3 eye(-3, 8, 40);
+  int hits = 0;
+  for (int i = 0; i < 400; ++i) {
+    const Vec3 target(-4 + 0.6 * (i % 20), -3 + 0.6 * (i / 20), 5);
+    const auto s = finger.hit(eye, target - eye);
+    // Independent: the least distance from the axis along the ray, sampled.
+    double least = 1e9;
+    for (int k = 0; k <= 4000; ++k) {
+      const Vec3 x = eye + 2e-3 * k / 4 * (target - eye);
+      least = std::min(least, (x - finger.axis_point(x)).norm());
+    }
+    if (std::abs(least - 2) < 1e-3) continue;
+    EXPECT_EQ(s.has_value(), least < 2);
+    if (!s) continue;
+    ++hits;
+    const Vec3 x = eye + *s * (target - eye);
+    EXPECT_NEAR((x - finger.axis_point(x)).norm(), 2, 1e-9);
+    EXPECT_GT((eye + 0.999 * *s * (target - eye) - finger.axis_point(x)).norm(), 2);
+  }
+  EXPECT_GT(hits, 40);
+}
+
+}  // namespace
+}  // namespace rhytid::tools
