@@ -11,6 +11,7 @@ namespace rhytid {
 void RunOptions::validate() const {
   require(frame_rate > 0 && std::isfinite(frame_rate), "RunOptions::frame_rate must be positive");
   require(frames >= 0, "RunOptions::frames must not be negative");
+  require(frames_done >= 0, "RunOptions::frames_done must not be negative");
   require(substeps >= 1, "RunOptions::substeps must be at least 1");
   require(max_bisections >= 0 && max_bisections <= 20, "RunOptions::max_bisections must be in 0..20");
   minimiser.validate();
@@ -27,9 +28,9 @@ Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions
   BlockMatrix matrix(model.pattern());
   CholeskyFactor factor(model.pattern());
   const double frame_dt = 1 / options.frame_rate;
-  const double t0 = run.initial.time;
+  const double t0 = options.frames_done > 0 ? 0 : run.initial.time;
 
-  for (int frame = 1; frame <= options.frames; ++frame) {
+  for (int frame = options.frames_done + 1; frame <= options.frames; ++frame) {
     for (int sub = 1; sub <= options.substeps; ++sub) {
       // Times from integers, so that they do not depend on how often steps were bisected.
       const double t_end = t0 + frame_dt * (frame - 1 + static_cast<double>(sub) / options.substeps);

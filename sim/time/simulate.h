@@ -14,6 +14,7 @@ struct RunOptions {
   double frame_rate = 24;  ///< frames per second
   int frames = 0;          ///< frames after the rest frame
   int substeps = 1;        ///< steps per frame
+  int frames_done = 0;     ///< frames behind `initial`, when it continues a run that began at time 0
   int max_bisections = 4;  ///< a step that fails is halved at most this often
   MinimiserOptions minimiser;
   bool keep_states = true;  ///< keep every step's state in the trajectory (needed for gradients)
@@ -58,7 +59,8 @@ struct RunObserver {
       iteration;  ///< false = stop
 };
 
-/// Runs from `initial` (rest when null). Step times are fixed by frame rate and substeps, plus bisections.
+/// Runs from `initial` (rest when null). Step times are fixed by frame rate and substeps, plus bisections; a
+/// run continued from a state at frame `frames_done` has the step times, and so the bits, of the whole run.
 Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions& options,
                     const RunObserver& observer = {}, const State* initial = nullptr);
 

@@ -1,0 +1,110 @@
+#!/bin/bash
+# check, simulate and heatmap of a real program: exit codes, files, one line on errors.
+#   forward_verbs.sh PROGRAM SOURCE_FOLDER SCRATCH_FOLDER
+set -u
+program=$1 source=$2 scratch=$3
+failures=0
+fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+rm -rf "$scratch" && mkdir -p "$scratch" && cd "$scratch" || exit 1
+
+cat >tiny.json <<'SCENE'
+{
+  // A pressed and dragged patch, small enough for a second.
+  "name": "tiny",
+  "skin": {
+    "surface": {"grid": {"size": [12, 10], "cells": [3, 2]}}, "order": 2,
+    "layers": [{"name": "soft", "thickness": 1.5, "youngs_modulus": "20 kPa"}]
+  },
+  "ligaments": {"sources": [{"name": "a", "position": [-3, 0, -1.5], "strength": 1},
+                            {"name": "b", "position": [3, 0, -1.5], "strength": 4}]},
+  "base": {"shape": "plane", "centre": [0, 0, -1.5]},
+  "colliders": [{"name": "finger", "radius": 4, "friction": {"coefficient": 0.5},
+                 "path": [{"time": 0, "position": [-1, 0, 4.01]}, {"time": 0.125, "position": [-1, 0, 3.7]},
+                          {"time": 1, "position": [1, 0, 3.7]}]}],
+  "time": {"frames": 4}
+}
+SCENE
+small=(--threads 1 --picture-width 120 --subdivide 2)
+
+# expect CODE LINES_ON_STDERR PATTERN ARGUMENTS...: PATTERN must occur in stdout and stderr together.
+expect() {
+  local code=$1 lines=$2 pattern=$3 actual
+  shift 3
+  "$program" "$@" >out.txt 2>err.txt
+  actual=$?
+  [ "$actual" = "$code" ] || fail "$*: exit $actual, expected $code: $(cat err.txt)"
+  [ "$lines" = any ] || [ "$(wc -l <err.txt)" = "$lines" ] || fail "$*: $(wc -l <err.txt) lines on stderr: $(cat err.txt)"
+  cat out.txt err.txt | grep -qE -- "$pattern" || fail "$*: no '$pattern' in: $(cat out.txt err.txt)"
+}
+
+# Whole files: valid JSON, XML, PNG signature, no temporary names left, series name existing files.
+whole() {
+  /usr/bin/env python3 - "$1" <<'PYTHON' || fail "files of $1"
+import json, pathlib, sys, xml.etree.ElementTree as xml
+folder = pathlib.Path(sys.argv[1])
+run = json.loads((folder / "run.json").read_text())
+rows = (folder / "steps.csv").read_text().splitlines() if (folder / "steps.csv").exists() else []
+assert all(len(r.split(",")) == len(rows[0].split(",")) for r in rows), "ragged table"
+for series in ("frames.pvd", "surface.pvd"):
+    if (folder / series).exists():
+        sets = xml.parse(folder / series).getroot().findall(".//DataSet")
+        assert sets and all((folder / s.get("file")).stat().st_size > 0 for s in sets), series
+for picture in folder.glob("pictures/*.png"):
+    data = picture.read_bytes()
+    assert data[:4] == b"\x89PNG" and b"IEND" in data[-12:], picture
+known = {".vtu", ".vtp", ".pvd", ".png", ".json", ".csv", ".bin"}
+strange = [p for p in folder.rglob("*") if p.is_file() and p.suffix not in known]
+assert not strange, strange
+print(run["exit"]["status"], run["progress"]["frames_done"], len(rows))
+PYTHON
+}
+
+expect 0 0 'left out: no layer relaxes' check tiny.json --set /skin/layers/soft/relaxing_fraction=0
+expect 0 0 'residual at rest +0 N' check tiny.json
+expect 0 0 '"memory_MB"' check tiny.json --json
+/usr/bin/env python3 -c 'import json; json.load(open("out.txt"))' || fail "check --json is not JSON"
+expect 2 1 'no_such.json' check no_such.json
+expect 2 1 'tiny.json:[0-9]+: /skin/layers/0/thicknes|thickness' check tiny.json --set /skin/layers/soft/thicknes=1
+expect 2 1 '/ligaments' heatmap "$source/data/scenes/elastic_patch/scene.json"
+expect 2 1 '--set /skin/surface/file=PATH' check "$source/data/scenes/head_forehead/scene.json"
+expect 2 1 '--output' simulate tiny.json -o /dev/null/x
+
+expect 0 any 'written to run_a' simulate tiny.json -o run_a "${small[@]}"
+[ "$(whole run_a)" = "complete 4 5" ] || fail "run_a: $(whole run_a)"
+[ "$(ls run_a/frames run_a/surface run_a/pictures | grep -c frame_)" = 10 ] || fail "frames of run_a"
+[ "$(ls run_a/pictures | wc -l)" = 10 ] || fail "pictures of run_a"
+
+# Every second frame and the last; table and pictures off.
+expect 0 any 'written to' simulate tiny.json -o run_b "${small[@]}" --set /time/frames=3 --set /output/every=2 \
+  --set /output/pictures=false --set /output/csv=false
+[ "$(ls run_b/frames | tr '\n' ' ')" = "frame_0000.vtu frame_0002.vtu frame_0003.vtu " ] || fail "every 2: $(ls run_b/frames)"
+[ ! -e run_b/pictures ] && [ ! -e run_b/steps.csv ] || fail "run_b has files that the scene turned off"
+
+# Does not converge: one error line among the progress, partial results.
+expect 3 any 'error: frame 1.*0 of 4 frames are kept' simulate tiny.json -o run_c "${small[@]}" \
+  --set /solver/max_iterations=1 --set /time/max_bisections=0
+[ "$(whole run_c)" = "not_converged 0 1" ] || fail "run_c: $(whole run_c)"
+
+# Interrupted, then resumed to the same bits.
+expect 0 any 'written to' simulate tiny.json -o run_d "${small[@]}" --set /time/frames=12
+"$program" simulate tiny.json -o run_e "${small[@]}" --set /time/frames=12 >out.txt 2>err.txt &
+pid=$!
+for _ in $(seq 2000); do [ -e run_e/frames/frame_0002.vtu ] && break; sleep 0.02; done
+kill -INT $pid
+wait $pid
+code=$?
+[ "$code" = 4 ] || fail "interrupted run: exit $code: $(cat err.txt)"
+case "$(whole run_e)" in interrupted\ [2-9]*) ;; *) fail "run_e: $(whole run_e)" ;; esac
+expect 2 1 'different scene' simulate tiny.json -o run_e "${small[@]}" --resume --set /base/stiffness=2
+expect 0 any 'resumed after frame' simulate tiny.json -o run_e "${small[@]}" --resume --set /time/frames=12
+[ "$(whole run_e)" = "complete 12 13" ] || fail "resumed run_e: $(whole run_e)"
+for file in steps.csv frames.pvd surface.pvd state.bin frames/frame_0012.vtu surface/frame_0012.vtp; do
+  cmp -s run_d/$file run_e/$file || fail "$file differs after a resume"
+done
+
+expect 0 any 'b from 1(\.[0-9]+)? to [34](\.[0-9]+)? 1/mm' heatmap tiny.json -o heat --weights --threads 1
+for file in heatmap.vtp heatmap.ply heatmap.csv heatmap.png weight_a.png weight_b.png; do
+  [ -s heat/$file ] || fail "heatmap did not write $file"
+done
+head -1 heat/heatmap.csv | grep -q 'column,x_mm,y_mm,z_mm,b_per_mm,weight_a,weight_b' || fail "heatmap.csv header"
+exit $((failures > 0))

@@ -1,0 +1,147 @@
+// What check says of a scene: bundled scenes rest in equilibrium, what a scene does not need is not there,
+// and doubtful settings are named.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "sim/scene/load.h"
+#include "tests/support/small_scenes.h"
+#include "tools/model_size.h"
+#include "tools/scene_review.h"
+
+namespace rhytid::tools {
+namespace {
+
+using testing::Contains;
+using testing::Each;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+/// Bundled scenes that need no file from elsewhere.
+std::vector<std::string> bundled_scenes() {
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(RHYTID_SOURCE_DIR "/data/scenes")) {
+    const auto file = entry.path() / "scene.json";
+    if (!std::filesystem::exists(file) || entry.path().filename() == "head_forehead") continue;
+    files.push_back(file.string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+Scene small_scene(const std::vector<std::string>& changes = {}) {
+  return parse_scene_text(test::drag_scene(2, 4), "small.json", changes);
+}
+
+std::vector<std::string> review(const std::vector<std::string>& changes) {
+  const SceneModel scene_model(small_scene(changes));
+  return review_scene(scene_model, measure_step_cost(scene_model));
+}
+
+TEST(BundledScenes, rest_in_equilibrium) {
+  const std::vector<std::string> files = bundled_scenes();
+  ASSERT_GE(files.size(), 3u);
+  for (const std::string& file : files) {
+    SCOPED_TRACE(file);
+    const SceneModel scene_model(load_scene(file));
+    const StepCost cost = measure_step_cost(scene_model);
+    // Colliders stand off the skin at time 0, so every force is a product with an exact zero.
+    EXPECT_EQ(cost.rest_residual, 0);
+    EXPECT_TRUE(cost.positive_definite);
+    EXPECT_THAT(review_scene(scene_model, cost), Not(Contains(HasSubstr("collider"))));
+  }
+}
+
+TEST(BundledScenes, residual_is_seen_when_the_rest_state_is_none) {
+  const SceneModel scene_model(small_scene({"/colliders/finger/path/0/position=[-2, 0, 4.5]"}));
+  const StepCost cost = measure_step_cost(scene_model);
+  EXPECT_GT(cost.rest_residual, 1e-3);
+  EXPECT_THAT(review_scene(scene_model, cost), Contains(HasSubstr("into the skin at time 0")));
+}
+
+TEST(LeftOut, a_minimal_scene_neither_allocates_nor_computes_what_it_lacks) {
+  const SceneModel minimal(parse_scene_text(R"({
+    "name": "minimal",
+    "skin": {"surface": {"grid": {"size": [8, 8], "cells": [2, 2]}}, "order": 2,
+             "layers": [{"name": "a", "thickness": 1, "youngs_modulus": 0.1, "relaxing_fraction": 0}]},
+    "time": {"frames": 1}
+  })",
+                                            "minimal.json"));
+  const Model& model = minimal.model();
+  ASSERT_EQ(model.terms.size(), 1u);
+  EXPECT_EQ(model.terms[0].name(), "skin (elastic)");
+  EXPECT_EQ(model.history_size(), 0u);
+  EXPECT_THAT(model.shapes, IsEmpty());
+  EXPECT_EQ(model.native_blocks.size(), 1u);
+  EXPECT_THAT(minimal.source_positions(), IsEmpty());
+  EXPECT_THAT(minimal.column_triangles(), IsEmpty());
+  for (const FeatureNote& note : minimal.features()) EXPECT_FALSE(note.present) << note.feature;
+  const Trajectory run = simulate(model, minimal.native(), minimal.run_options());
+  EXPECT_TRUE(run.complete);
+  EXPECT_EQ(run.steps[0].state.history.size(), 0);
+  EXPECT_EQ(run.steps[0].state.u.norm(), 0);
+}
+
+TEST(LeftOut, every_feature_adds_its_own_term_and_work) {
+  const auto names = [](const SceneModel& s) {
+    std::vector<std::string> list;
+    for (const Term& t : s.model().terms) list.push_back(t.name());
+    return list;
+  };
+  const SceneModel full(small_scene());
+  EXPECT_THAT(names(full),
+              ElementsAre("skin", "ligaments", "base contact", "contact finger", "friction finger"));
+  measure_step_cost(full);
+  for (const Term& term : full.model().terms) {
+    EXPECT_GT(term.counters().gradient + term.counters().energy, 0) << term.name();
+    EXPECT_GT(term.counters().hessian, 0) << term.name();
+  }
+  const SceneModel frictionless(small_scene({"/colliders/finger/friction/coefficient=0"}));
+  EXPECT_THAT(names(frictionless), ElementsAre("skin", "ligaments", "base contact", "contact finger"));
+  EXPECT_LT(frictionless.model().history_size(), full.model().history_size());
+}
+
+TEST(WrinkleScale, is_the_film_on_a_half_space) {
+  // h = 0.1 mm, ratio 200, equal Poisson's ratios: 25.5 h and 1.52 % (Chen and Hutchinson).
+  const SceneModel scene_model(
+      small_scene({"/skin/layers/film/thickness=0.1", "/skin/layers/film/youngs_modulus=4",
+                   "/skin/layers/soft/youngs_modulus=0.02", "/skin/surface/grid/cells=[8, 6]"}));
+  const auto scale = wrinkle_scale(scene_model);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(scale->wavelength, 2.548, 0.001);
+  EXPECT_NEAR(scale->critical_strain, 0.015206, 1e-5);
+  // Cells of 2 × 2 mm: edges 2, 2, 2√2 with half of the boundary's edges counted once; order 2 halves them.
+  EXPECT_NEAR(scale->node_spacing, (2 + 2 + 2 * std::numbers::sqrt2) / 3 / 2, 1e-12);
+  EXPECT_THAT(review_scene(scene_model, measure_step_cost(scene_model)),
+              Contains(HasSubstr("too coarse to wrinkle")));
+  EXPECT_FALSE(wrinkle_scale(SceneModel(small_scene({"/skin/layers/film/youngs_modulus=0.02"}))));
+}
+
+TEST(Review, names_what_holds_nothing) {
+  EXPECT_THAT(review({"/skin/rim=free"}), Not(Contains(HasSubstr("a free rim"))));  // the ligaments hold it
+  Scene loose = small_scene({"/skin/rim=free"});
+  loose.ligaments.reset();
+  const SceneModel on_base(loose);
+  EXPECT_THAT(review_scene(on_base, measure_step_cost(on_base)), Contains(HasSubstr("the base only pushes")));
+  loose.base.reset();
+  const SceneModel nothing(loose);
+  EXPECT_THAT(review_scene(nothing, measure_step_cost(nothing)),
+              Contains(HasSubstr("neither ligaments nor base")));
+}
+
+TEST(Review, names_colliders_and_sources_that_miss) {
+  EXPECT_THAT(review({"/colliders/finger/path/1/position=[-2, 0, 5.5]",
+                      "/colliders/finger/path/2/position=[-2, 0, 5.5]"}),
+              Contains(HasSubstr("never touches the skin")));
+  EXPECT_THAT(review({"/colliders/finger/path/1/position=[-7, 0, 4.5]"}),
+              Contains(HasSubstr("from the rim")));
+  EXPECT_THAT(review({"/ligaments/sources/left/position=[-5, 1, 40]"}), Contains(HasSubstr("was moved by")));
+  EXPECT_THAT(review({"/ligaments/sources/left/radius=0.05"}), Contains(HasSubstr("contains no node")));
+}
+
+}  // namespace
+}  // namespace rhytid::tools

@@ -1,0 +1,174 @@
+#include "tools/scene_review.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "sim/core/units.h"
+#include "sim/surface/heat_map.h"
+#include "sim/terms/contact_law.h"
+
+namespace rhytid::tools {
+namespace {
+
+std::string length_text(double mm) {
+  return format_quantity(mm, dimension::length, 3);
+}
+
+std::string number_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+double mean_edge(const SkinMesh& mesh) {
+  double sum = 0;
+  for (const auto& f : mesh.surface.faces)
+    for (int k = 0; k < 3; ++k)
+      sum += (mesh.surface.vertices.row(f[k]) - mesh.surface.vertices.row(f[(k + 1) % 3])).norm();
+  return sum / (3 * static_cast<double>(mesh.surface.faces.size()));
+}
+
+double skin_thickness(const SkinScene& skin) {
+  double sum = 0;
+  for (const LayerScene& l : skin.layers) sum += l.thickness;
+  return sum;
+}
+
+void review_wrinkles(const SceneModel& scene_model, std::vector<std::string>& warnings) {
+  const auto scale = wrinkle_scale(scene_model);
+  if (!scale) return;
+  if (scale->nodes_per_wavelength() < wanted_nodes_per_wavelength)
+    warnings.push_back("the mesh is too coarse to wrinkle: " + scale->film + " on " + scale->soft +
+                       " has a wavelength of " + length_text(scale->wavelength) + ", that is " +
+                       number_text(scale->nodes_per_wavelength()) + " nodes " +
+                       length_text(scale->node_spacing) +
+                       " apart; 10 or more resolve it (finer cells or a "
+                       "higher /skin/order)");
+}
+
+void review_support(const SceneModel& scene_model, const StepCost& cost, std::vector<std::string>& warnings) {
+  const Scene& scene = scene_model.scene();
+  if (scene.skin.rim == RimCondition::clamped) return;
+  // A pivot this far below the largest is a rigid motion that only rounding resists.
+  if (cost.positive_definite && cost.smallest_pivot > 1e-13 * cost.largest_pivot) return;
+  const std::string rim = scene.skin.rim == RimCondition::free ? "a free rim" : "a sliding rim";
+  if (scene.ligaments) {
+    warnings.push_back(rim + " and ligaments so weak that the stiffness at rest is singular to rounding");
+  } else if (scene.base) {
+    warnings.push_back(rim +
+                       " and no ligaments: nothing holds the skin at rest, since the base only pushes; "
+                       "the first step will hardly converge");
+  } else {
+    warnings.push_back(rim +
+                       " with neither ligaments nor base: nothing holds the skin; it can move as a rigid "
+                       "body and a step has no unique minimum");
+  }
+}
+
+void review_collider(const SceneModel& scene_model, const ColliderScene& collider,
+                     std::vector<std::string>& warnings) {
+  const SkinMesh& mesh = scene_model.model().mesh;
+  const TimeScene& time = scene_model.scene().time;
+  if (time.frames == 0) return;
+  std::vector<double> knots;
+  for (const PathKnot& k : collider.path) knots.push_back(k.time);
+  const auto centre = [&](double t) -> Vec3 {
+    const PathWeights w = path_weights(knots, t);
+    return w.weight[0] * collider.path[w.knot[0]].position + w.weight[1] * collider.path[w.knot[1]].position;
+  };
+  const Vec3 n = collider.normal.normalized();
+  const auto gap = [&](const Vec3& x, const Vec3& c) {
+    return collider.shape == ShapeKind::sphere ? (x - c).norm() - collider.radius : n.dot(x - c);
+  };
+  const std::string at = "collider " + collider.name;
+  double rest_gap = std::numeric_limits<double>::infinity(), smallest = rest_gap, rim_distance = rest_gap;
+  for (int frame = 0; frame <= time.frames; ++frame) {
+    const Vec3 c = centre(frame / time.frame_rate);
+    double here = std::numeric_limits<double>::infinity();
+    Vec3 touched = Vec3::Zero();
+    for (int column = 0; column < mesh.num_columns; ++column) {
+      const Vec3 x = mesh.rest.row(mesh.node(column, mesh.num_levels - 1)).transpose();
+      const double g = gap(x, c);
+      if (g < here) here = g, touched = x;
+    }
+    if (frame == 0) rest_gap = here;
+    smallest = std::min(smallest, here);
+    if (here > 0 || collider.shape != ShapeKind::sphere) continue;
+    for (int column : mesh.rim_columns) {
+      const Vec3 x = mesh.rest.row(mesh.node(column, mesh.num_levels - 1)).transpose();
+      rim_distance = std::min(rim_distance, (x - touched).norm());
+    }
+  }
+  if (rest_gap < 0)
+    warnings.push_back(at + " reaches " + length_text(-rest_gap) +
+                       " into the skin at time 0, so that the rest state is no equilibrium");
+  if (smallest > 0)
+    warnings.push_back(at + " never touches the skin: it stays " + length_text(smallest) +
+                       " away from the surface at rest");
+  const double thickness = skin_thickness(scene_model.scene().skin);
+  if (rim_distance < 4 * thickness)
+    warnings.push_back(at + " pushes " + length_text(rim_distance) +
+                       " from the rim, less than four skin thicknesses (" + length_text(4 * thickness) +
+                       "): the boundary condition there will shape the result");
+}
+
+void review_ligaments(const SceneModel& scene_model, std::vector<std::string>& warnings) {
+  const Scene& scene = scene_model.scene();
+  if (!scene.ligaments) return;
+  const SkinMesh& mesh = scene_model.model().mesh;
+  MatrixX3 inner(mesh.num_columns, 3);
+  for (int c = 0; c < mesh.num_columns; ++c) inner.row(c) = mesh.rest.row(mesh.node(c, 0));
+  const auto& listed = scene.ligaments->sources;
+  std::vector<HeatSource> sources;
+  for (std::size_t s = 0; s < listed.size(); ++s) {
+    sources.push_back({scene_model.source_positions()[s], listed[s].radius});
+    if (listed[s].vertex) continue;
+    const double moved = (scene_model.source_positions()[s] - listed[s].position).norm();
+    if (moved > std::max(2 * skin_thickness(scene.skin), mean_edge(mesh)))
+      warnings.push_back("ligament source " + listed[s].name + " was moved by " + length_text(moved) +
+                         " to reach the inner surface");
+  }
+  const HeatMapWeights heat =
+      diffuse_sources(inner, scene_model.column_triangles(), sources, scene.ligaments->diffusion_time);
+  if (heat.num_unreached > 0)
+    warnings.push_back(std::to_string(heat.num_unreached) + " of " + std::to_string(mesh.num_columns) +
+                       " inner nodes are reached by no ligament source and take the nearest one's strength; "
+                       "raise /ligaments/diffusion_time");
+  for (int s : heat.unresolved_sources)
+    warnings.push_back("ligament source " + listed[s].name + ": its radius " + length_text(listed[s].radius) +
+                       " contains no node, so that it acts on the nearest one alone");
+}
+
+}  // namespace
+
+std::optional<WrinkleScale> wrinkle_scale(const SceneModel& scene_model) {
+  const SkinScene& skin = scene_model.scene().skin;
+  if (skin.layers.size() < 2) return std::nullopt;
+  const LayerScene& film = skin.layers.back();
+  const LayerScene& soft = skin.layers[skin.layers.size() - 2];
+  const auto plane_strain = [](const LayerScene& l) {
+    return l.youngs_modulus / (1 - l.poissons_ratio * l.poissons_ratio);
+  };
+  const double ratio = plane_strain(film) / (3 * plane_strain(soft));
+  if (film.youngs_modulus < 5 * soft.youngs_modulus) return std::nullopt;
+  WrinkleScale scale;
+  scale.film = film.name;
+  scale.soft = soft.name;
+  scale.wavelength = 2 * std::numbers::pi * film.thickness * std::cbrt(ratio);
+  scale.critical_strain = 0.25 / std::pow(ratio, 2. / 3);
+  scale.node_spacing = mean_edge(scene_model.model().mesh) / skin.order;
+  return scale;
+}
+
+std::vector<std::string> review_scene(const SceneModel& scene_model, const StepCost& cost) {
+  std::vector<std::string> warnings;
+  review_support(scene_model, cost, warnings);
+  review_wrinkles(scene_model, warnings);
+  for (const ColliderScene& c : scene_model.scene().colliders) review_collider(scene_model, c, warnings);
+  review_ligaments(scene_model, warnings);
+  return warnings;
+}
+
+}  // namespace rhytid::tools

@@ -1,0 +1,228 @@
+// rhytid check: everything that can be said about a scene before it runs.
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "sim/core/units.h"
+#include "sim/scene/load.h"
+#include "tools/model_size.h"
+#include "tools/scene_review.h"
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// 12345678 -> "12.3 M".
+std::string count_text(double n) {
+  char text[32];
+  if (n < 1e5) {
+    std::snprintf(text, sizeof text, "%.0f", n);
+  } else if (n < 1e6) {
+    std::snprintf(text, sizeof text, "%.0f k", n / 1e3);
+  } else {
+    std::snprintf(text, sizeof text, "%.3g M", n / 1e6);
+  }
+  return text;
+}
+
+std::string number_text(double value, const char* pattern = "%.3g") {
+  char text[32];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+std::string seconds_text(double s) {
+  return s < 10 ? number_text(s, "%.2g s") : duration_text(s);
+}
+
+/// All findings of a check.
+struct Findings {
+  const SceneModel& scene_model;
+  ModelSize size;
+  StepCost cost;
+  MemoryEstimate memory;
+  std::optional<WrinkleScale> wrinkles;
+  std::vector<std::string> warnings;
+
+  explicit Findings(const SceneModel& built)
+      : scene_model(built),
+        size(model_size(built)),
+        cost(measure_step_cost(built)),
+        memory(memory_estimate(built, size, cost.factor_entries)),
+        wrinkles(wrinkle_scale(built)),
+        warnings(scene_warnings(built.scene())) {
+    const std::vector<std::string> more = review_scene(built, cost);
+    warnings.insert(warnings.end(), more.begin(), more.end());
+  }
+  int steps() const { return scene_model.scene().time.frames * scene_model.scene().time.substeps; }
+  double run_seconds() const {
+    return cost.analysis_seconds + steps() * expected_iterations * cost.iteration_seconds();
+  }
+};
+
+ordered_json to_json(const Findings& f) {
+  const Scene& scene = f.scene_model.scene();
+  ordered_json j = {{"scene", scene.name}, {"file", scene.file}};
+  j["sizes"] = {{"faces", f.size.faces},
+                {"columns", f.size.columns},
+                {"levels", f.size.levels},
+                {"nodes", f.size.nodes},
+                {"elements", f.size.elements},
+                {"unknowns", f.size.unknowns},
+                {"history", f.size.history},
+                {"matrix_entries", f.size.matrix_entries},
+                {"factor_entries", f.cost.factor_entries}};
+  j["terms"] = ordered_json::array();
+  for (std::size_t k = 0; k < f.size.terms.size(); ++k) {
+    const TermSize& t = f.size.terms[k];
+    const TermCounters& counters = f.scene_model.model().terms[k].counters();
+    j["terms"].push_back({{"name", t.name},
+                          {"points", t.points},
+                          {"points_per_element", t.points_per_element},
+                          {"history", t.history},
+                          {"counters",
+                           {{"energy", counters.energy},
+                            {"gradient", counters.gradient},
+                            {"hessian", counters.hessian},
+                            {"update", counters.update}}}});
+  }
+  j["features"] = ordered_json::array();
+  for (const FeatureNote& n : f.scene_model.features())
+    j["features"].push_back({{"feature", n.feature}, {"present", n.present}, {"detail", n.detail}});
+  j["rest"] = {{"residual_N", f.cost.rest_residual},
+               {"positive_definite", f.cost.positive_definite},
+               {"smallest_pivot", f.cost.smallest_pivot},
+               {"largest_pivot", f.cost.largest_pivot}};
+  if (f.wrinkles)
+    j["wrinkles"] = {{"film", f.wrinkles->film},
+                     {"soft", f.wrinkles->soft},
+                     {"wavelength_mm", f.wrinkles->wavelength},
+                     {"critical_strain", f.wrinkles->critical_strain},
+                     {"node_spacing_mm", f.wrinkles->node_spacing},
+                     {"nodes_per_wavelength", f.wrinkles->nodes_per_wavelength()}};
+  j["estimate"] = {{"steps", f.steps()},
+                   {"iterations_per_step", expected_iterations},
+                   {"residual_s", f.cost.residual_seconds},
+                   {"hessian_s", f.cost.hessian_seconds},
+                   {"factorisation_s", f.cost.factor_seconds},
+                   {"analysis_s", f.cost.analysis_seconds},
+                   {"run_s", f.run_seconds()},
+                   {"memory_MB",
+                    {{"model", f.memory.model},
+                     {"matrix", f.memory.matrix},
+                     {"factor", f.memory.factor},
+                     {"states", f.memory.states},
+                     {"total", f.memory.total()}}},
+                   {"resident_MB", resident_memory_mb()}};
+  j["warnings"] = f.warnings;
+  return j;
+}
+
+class Lines {
+ public:
+  explicit Lines(std::ostream& out) : out_(out) {}
+  void heading(const std::string& text) { out_ << '\n' << text << '\n'; }
+  void row(const std::string& name, const std::string& value) {
+    out_ << "  " << std::left << std::setw(22) << name << value << '\n';
+  }
+
+ private:
+  std::ostream& out_;
+};
+
+std::string term_text(const TermSize& t) {
+  std::string text = count_text(static_cast<double>(t.points)) + " points (";
+  for (std::size_t k = 0; k < t.points_per_element.size(); ++k)
+    text += (k ? " + " : "") + std::to_string(t.points_per_element[k]);
+  text += t.points_per_element.size() > 1 ? " per face)" : " per element)";
+  return t.history ? text + ", " + count_text(static_cast<double>(t.history)) + " numbers of history" : text;
+}
+
+void print(const Findings& f, std::ostream& out) {
+  const Scene& scene = f.scene_model.scene();
+  Lines lines(out);
+  out << scene.name << " (" << scene.file << ") is valid\n";
+  if (!scene.description.empty()) out << scene.description << '\n';
+
+  lines.heading("Sizes");
+  lines.row("faces", std::to_string(f.size.faces) + ", " + std::to_string(f.size.elements) + " elements");
+  lines.row("nodes", std::to_string(f.size.nodes) + " (" + std::to_string(f.size.columns) + " columns x " +
+                         std::to_string(f.size.levels) + " levels)");
+  lines.row("unknowns", std::to_string(f.size.unknowns));
+  lines.row("nnz(A), nnz(L)", count_text(static_cast<double>(f.size.matrix_entries)) + " (lower triangle), " +
+                                  count_text(static_cast<double>(f.cost.factor_entries)));
+  for (const TermSize& t : f.size.terms) lines.row(t.name, term_text(t));
+
+  lines.heading("Physics");
+  for (const FeatureNote& n : f.scene_model.features())
+    lines.row(n.feature, (n.present ? "yes: " : "left out: ") + n.detail);
+  lines.row("residual at rest", f.cost.rest_residual == 0 ? "0 N, exactly an equilibrium"
+                                                          : number_text(f.cost.rest_residual) + " N");
+  if (f.wrinkles)
+    lines.row("wrinkles", f.wrinkles->film + " on " + f.wrinkles->soft + ": wavelength " +
+                              format_quantity(f.wrinkles->wavelength, dimension::length, 3) +
+                              " from a compression of " + number_text(100 * f.wrinkles->critical_strain) +
+                              " % (half-space), " + number_text(f.wrinkles->nodes_per_wavelength()) +
+                              " nodes per wavelength");
+
+  lines.heading("Estimate");
+  lines.row("memory",
+            number_text(f.memory.total(), "%.0f MB") + ": model " + number_text(f.memory.model, "%.0f") +
+                ", matrix " + number_text(f.memory.matrix, "%.0f") + ", factor " +
+                number_text(f.memory.factor, "%.0f") + ", states " + number_text(f.memory.states, "%.0f") +
+                "; this check holds " + number_text(resident_memory_mb(), "%.0f MB"));
+  lines.row("one iteration", seconds_text(f.cost.iteration_seconds()) + ": residual " +
+                                 seconds_text(f.cost.residual_seconds) + ", Hessian " +
+                                 seconds_text(f.cost.hessian_seconds) + ", factorisation " +
+                                 seconds_text(f.cost.factor_seconds));
+  lines.row("run", "about " + seconds_text(f.run_seconds()) + ": " + std::to_string(f.steps()) + " steps x " +
+                       std::to_string(expected_iterations) + " iterations, without files and pictures");
+
+  lines.heading(f.warnings.empty() ? "No warnings" : "Warnings");
+  for (const std::string& w : f.warnings) out << "  - " << w << '\n';
+}
+
+class Check : public Verb {
+ public:
+  VerbHelp help() const override {
+    return {
+        "check",
+        "validate a scene; sizes, memory and time, what is left out, warnings",
+        "Validates the scene, builds its mesh and energy terms, and measures one Newton iteration at rest. "
+        "Prints sizes, the features in use and those left out with the reason, the predicted wrinkle "
+        "wavelength against the mesh, estimates of memory and time, and warnings about settings that are "
+        "allowed but doubtful. Nothing is simulated and nothing is written.",
+        "scene.json, and the mesh it names",
+        "a report on stdout; one JSON object with --json",
+        "rhytid check data/scenes/sheet_drag/scene.json"};
+  }
+  void add_options(CLI::App& app) override {
+    app.add_flag("--json", as_json_, "the findings as one JSON object");
+  }
+
+  ExitCode run(VerbContext& context) override {
+    const SceneModel scene_model(load_scene(context.options.file, context.options.settings));
+    const Findings findings(scene_model);
+    if (as_json_) {
+      context.out << to_json(findings).dump(2) << '\n';
+    } else {
+      print(findings, context.out);
+    }
+    return context.progress.interrupted() ? ExitCode::interrupted : ExitCode::ok;
+  }
+
+ private:
+  bool as_json_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Verb> make_verb_check() {
+  return std::make_unique<Check>();
+}
+
+}  // namespace rhytid::tools
