@@ -108,9 +108,9 @@ void review_collider(const SceneModel& scene_model, const ColliderScene& collide
     warnings.push_back(at + " never touches the skin: it stays " + length_text(smallest) +
                        " away from the surface at rest");
   const double thickness = skin_thickness(scene_model.scene().skin);
-  if (rim_distance < 4 * thickness)
+  if (rim_distance < 3 * thickness)
     warnings.push_back(at + " pushes " + length_text(rim_distance) +
-                       " from the rim, less than four skin thicknesses (" + length_text(4 * thickness) +
+                       " from the rim, less than three skin thicknesses (" + length_text(3 * thickness) +
                        "): the boundary condition there will shape the result");
 }
 
