@@ -124,6 +124,36 @@ TEST(Fit, FreeGaugeIsReportedAndTheRatioSurvives) {
   EXPECT_LT(result.derived[0].high95 / result.derived[0].low95, 2);
 }
 
+TEST(Fit, PenaltyIsNoYardstick) {
+  // The same question in two gauges: the soft modulus held, or the film's. Were the penalties fixed in
+  // MPa/mm, they would tie the tissue to an absolute scale and the two ratios would differ.
+  const auto fit_with = [](const char* modulus, double start) {
+    FitCase fit = test::three_parameters();
+    fit.parameters = {test::fitted(modulus, start), test::fitted("/ligaments/stiffness")};
+    return run_fit(make_input(fit));
+  };
+  const FitResult soft_held = fit_with("/skin/layers/film/youngs_modulus", 0.8);
+  const FitResult film_held = fit_with("/skin/layers/soft/youngs_modulus", 0.025);
+  ASSERT_TRUE(soft_held.converged && film_held.converged);
+  EXPECT_NEAR(soft_held.final_cost, film_held.final_cost, 1e-4);
+  EXPECT_NEAR(soft_held.derived.at(0).value / film_held.derived.at(0).value, 1, 1e-4);
+  EXPECT_NEAR(soft_held.derived[0].high95 / film_held.derived[0].high95, 1, 1e-3);
+  EXPECT_THAT(film_held.gauge, HasSubstr("penalties followed"));
+}
+
+TEST(Fit, TruthInAnotherGaugeIsComparedPerUnitOfTheHeldModulus) {
+  FitCase fit = test::three_parameters();
+  fit.max_evaluations = 1;
+  FitInput input = make_input(fit);
+  input.truth = {{"/skin/layers/soft/youngs_modulus", 0.04},
+                 {"/skin/layers/film/youngs_modulus", 2},
+                 {"/colliders/finger/friction/coefficient", 0.4}};
+  const FitResult result = run_fit(input);
+  EXPECT_FALSE(result.parameters[0].truth);
+  EXPECT_DOUBLE_EQ(*result.parameters[1].truth, 1);
+  EXPECT_DOUBLE_EQ(*result.parameters[2].truth, 0.4);
+}
+
 TEST(Fit, FailedForwardRunsAreAStatus) {
   FitInput input = make_input(test::three_parameters());
   input.scene.solver.max_iterations = 1;
