@@ -25,10 +25,10 @@ void make_folder(const std::string& path) {
   if (error) throw InputError(path + ": cannot be made (" + error.message() + ")");
 }
 
-/// The next of 1, 2, 5, 10, ...: colour scales then change seldom from frame to frame.
+/// The next of a few round numbers: colour scales then change seldom from frame to frame.
 double round_up(double value) {
   const double power = std::pow(10., std::floor(std::log10(value)));
-  for (const double digit : {1., 2., 5.})
+  for (const double digit : {1., 1.2, 1.5, 2., 2.5, 3., 4., 5., 6., 8.})
     if (value <= digit * power) return digit * power;
   return 10 * power;
 }

@@ -74,6 +74,13 @@ expect 0 any 'written to run_a' simulate tiny.json -o run_a "${small[@]}"
 [ "$(ls run_a/frames run_a/surface run_a/pictures | grep -c frame_)" = 10 ] || fail "frames of run_a"
 [ "$(ls run_a/pictures | wc -l)" = 10 ] || fail "pictures of run_a"
 
+for python in /usr/bin/python3 python3; do
+  "$python" "$source/tests/tools/read_series.py" run_a >vtk.txt 2>&1
+  code=$?
+  [ $code = 77 ] || break
+done
+[ $code = 0 ] || [ $code = 77 ] || fail "read back with VTK: $(cat vtk.txt)"
+
 # Every second frame and the last; table and pictures off.
 expect 0 any 'written to' simulate tiny.json -o run_b "${small[@]}" --set /time/frames=3 --set /output/every=2 \
   --set /output/pictures=false --set /output/csv=false

@@ -2,6 +2,7 @@
 // and doubtful settings are named.
 #include <gmock/gmock.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -56,6 +57,18 @@ TEST(BundledScenes, rest_in_equilibrium) {
     EXPECT_THAT(warnings, Not(Contains(HasSubstr("into the skin at time 0"))));
     EXPECT_THAT(warnings, Not(Contains(HasSubstr("never touches"))));
   }
+}
+
+TEST(BundledScenes, head_rests_in_equilibrium) {
+  const char* folder = std::getenv("RHYTID_REALDATA");
+  if (!folder) GTEST_SKIP() << "RHYTID_REALDATA is not set: no real head to read";
+  const std::string head = std::string(folder) + "/heads/ict_facekit/generic_neutral_mesh.obj";
+  if (!std::filesystem::exists(head)) GTEST_SKIP() << head << " does not exist";
+  const SceneModel scene_model(
+      load_scene(RHYTID_SOURCE_DIR "/data/scenes/head_forehead/scene.json", {"/skin/surface/file=" + head}));
+  const StepCost cost = measure_step_cost(scene_model);
+  EXPECT_EQ(cost.rest_residual, 0);
+  EXPECT_THAT(review_scene(scene_model, cost), Each(HasSubstr("too coarse to wrinkle")));
 }
 
 TEST(BundledScenes, residual_is_seen_when_the_rest_state_is_none) {
