@@ -121,7 +121,7 @@ std::vector<Rule> skin_rules() {
        .type = integer,
        .fallback = skin.thickness_points,
        .min = 0,
-       .max = 16,
+       .max = 6,  // 33 × 6 points: what an element kernel holds at triangle degree 12
        .doc = "Gauss points through each layer; 0 = q + 1."},
       {.pointer = "/skin/quadrature/contact_degree",
        .type = integer,

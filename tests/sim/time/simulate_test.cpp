@@ -160,6 +160,19 @@ TEST(Simulate, ContinuesFromAStateAsIfItHadNotStopped) {
   EXPECT_LE((second.at_frame(2).u - whole.at_frame(4).u).lpNorm<Eigen::Infinity>(), 1e-7);
 }
 
+/// The densest rule that a scene may ask for fits into an element kernel.
+TEST(Simulate, DensestQuadratureOfASceneRuns) {
+  Scene s = parse_scene_text(test::drag_scene(1, 1), "drag.json",
+                             {"/skin/quadrature/triangle_degree=12", "/skin/quadrature/thickness_points=6",
+                              "/skin/quadrature/contact_degree=12"});
+  s.skin.surface.grid_cells = {2, 2};
+  const SceneModel m(s);
+  const Trajectory run = run_scene(m, m.run_options());
+  EXPECT_TRUE(run.complete) << run.failure;
+  EXPECT_THROW(parse_scene_text(test::drag_scene(1, 1), "drag.json", {"/skin/quadrature/thickness_points=7"}),
+               InputError);
+}
+
 TEST(Simulate, ObserverSeesEveryStepAndCanStop) {
   const SceneModel m(small_drag(1, 3));
   int steps = 0, frames = 0;
