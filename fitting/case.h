@@ -36,7 +36,7 @@ struct RenderCase {
   double noise = 1.0;                         ///< standard deviation of image noise, grey levels of 255
   unsigned seed = 1;                          ///< of texture and noise
   double texture_scale = 0.5;                 ///< mm, typical size of skin marks
-  std::string codec = "mjpg";                 ///< mjpg (avi) | h264 (mp4)
+  std::string codec = "mjpg";                 ///< mjpg (avi) | h264 (mp4; small, but it removes the noise)
   bool finger = true;                         ///< draw the colliders
   double tilt = 20 * std::numbers::pi / 180;  ///< rad, of the automatic camera off the mean normal
   int truth_spacing = 16;                     ///< px between the material points of truth_tracks.csv

@@ -152,12 +152,14 @@ class TrackVerb : public Verb {
     write_file(in_folder("track.json"), track_record(result.report, error).dump(2) + "\n");
     context.out << in_folder("tracks.csv") << ": " << fitting::summary(result.report) << '\n';
     if (error) {
-      char text[200];
-      std::snprintf(text, sizeof(text),
-                    "against the truth: rms %.3f px, median %.3f, 95 %% below %.3f, largest %.3f; %.2f times "
-                    "the stated deviation (%d tracks, %d off the skin)",
-                    error->rms_px, error->median_px, error->p95_px, error->largest_px, error->normalised,
-                    error->tracks, error->off_skin);
+      char text[320];
+      std::snprintf(
+          text, sizeof(text),
+          "against the truth: rms %.3f px, median %.3f, 95 %% below %.3f; %d of %d observations are "
+          "more than 1 px off (largest %.3f), the others rms %.3f; %.2f times the stated deviation "
+          "(%d tracks, %d off the skin)",
+          error->rms_px, error->median_px, error->p95_px, error->gross, error->observations,
+          error->largest_px, error->inlier_rms_px, error->normalised, error->tracks, error->off_skin);
       context.out << text << '\n';
     }
     return ExitCode::ok;

@@ -45,6 +45,8 @@ json track_record(const fitting::TrackerReport& report, const std::optional<Trac
                                      {"median_px", e.median_px},
                                      {"p95_px", e.p95_px},
                                      {"largest_px", e.largest_px},
+                                     {"gross", e.gross},
+                                     {"inlier_rms_px", e.inlier_rms_px},
                                      {"last_frame_rms_px", e.last_frame_rms_px},
                                      {"normalised", e.normalised}};
   }

@@ -52,7 +52,13 @@ TrackingError tracking_error(const fitting::TrackSet& tracks, const MovingSurfac
   std::sort(distances.begin(), distances.end());
   const size_t n = distances.size();
   double squares = 0;
-  for (const double d : distances) squares += d * d;
+  for (const double d : distances) {
+    if (d > 1 && out.gross++ == 0) out.inlier_rms_px = squares;
+    squares += d * d;
+  }
+  if (out.gross == 0) out.inlier_rms_px = squares;
+  const double inliers = std::max(1.0, static_cast<double>(n) - out.gross);
+  out.inlier_rms_px = std::sqrt(out.inlier_rms_px / inliers);
   out.observations = static_cast<int>(n);
   out.rms_px = std::sqrt(squares / static_cast<double>(n));
   out.median_px = distances[n / 2], out.p95_px = distances[n * 95 / 100], out.largest_px = distances.back();

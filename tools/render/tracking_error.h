@@ -13,6 +13,8 @@ struct TrackingError {
   int off_skin = 0;      ///< tracks whose first pixel is not on the skin
   int observations = 0;  ///< compared, the first of each track not counted
   double rms_px = 0, median_px = 0, p95_px = 0, largest_px = 0;  ///< of the distances
+  int gross = 0;                 ///< observations more than 1 px off: the tracker followed something else
+  double inlier_rms_px = 0;      ///< of the others
   double last_frame_rms_px = 0;  ///< of the observations in the last frame that has any
   /// Root of the mean of eᵀ Σ⁻¹ e / 2: 1 when the covariances are right, above when they promise too much.
   double normalised = 0;
