@@ -58,7 +58,8 @@ class ParameterReader {
     const ParameterSpec spec = described(item["address"].get<std::string>());
     if (!seen_.insert(spec.address).second)
       throw InputError(where("address"), shown_text(spec.address) + " a second time", "each parameter once");
-    FitParameter p{.address = spec.address};
+    FitParameter p;
+    p.address = spec.address;
     p.lower = quantity(item, "lower", spec), p.upper = quantity(item, "upper", spec);
     p.initial = quantity(item, "initial", spec);
     if (item.contains("prior_sigma")) p.prior_sigma = item["prior_sigma"].get<double>();
