@@ -62,4 +62,81 @@ void PointPositions::adjoint(int frame, const State&, const VectorXd& weights, V
     interpolation_.adjoint(k, weights.segment<3>(3 * k), u_bar);
 }
 
+MeanNormalDisplacement::MeanNormalDisplacement(const SkinMesh& mesh, std::vector<MaterialPoint> points,
+                                               int first_frame)
+    : interpolation_(mesh, std::move(points)),
+      normals_(MatrixX3::Zero(interpolation_.num_points(), 3)),
+      first_frame_(first_frame) {
+  const int n = mesh.nodes_per_face(), count = interpolation_.num_points();
+  const TriangleBasis basis(mesh.order);
+  std::vector<double> weights(n);
+  for (int k = 0; k < count; ++k) {
+    const MaterialPoint& p = interpolation_.points()[k];
+    basis.evaluate(p.u, p.v, weights.data(), nullptr, nullptr);
+    for (int i = 0; i < n; ++i)
+      normals_.row(k) +=
+          weights[i] * mesh.column_normals.row(mesh.face_columns[static_cast<std::size_t>(p.face) * n + i]);
+    normals_.row(k) /= normals_.row(k).norm() * count;
+  }
+}
+
+VectorXd MeanNormalDisplacement::values(int frame, const State& state) const {
+  VectorXd out = VectorXd::Zero(size(frame));
+  if (out.size() == 0) return out;
+  for (int k = 0; k < interpolation_.num_points(); ++k)
+    out[0] += normals_.row(k).dot(interpolation_.displacement(k, state.u));
+  return out;
+}
+
+MatrixXd MeanNormalDisplacement::tangent(int frame, const State&, const MatrixXd& du, const MatrixXd&) const {
+  MatrixXd out = MatrixXd::Zero(size(frame), du.cols());
+  if (out.rows() == 0) return out;
+  for (int k = 0; k < interpolation_.num_points(); ++k)
+    out.row(0) += normals_.row(k) * interpolation_.tangent(k, du);
+  return out;
+}
+
+void MeanNormalDisplacement::adjoint(int frame, const State&, const VectorXd& weights, VectorXd& u_bar,
+                                     VectorXd&) const {
+  if (size(frame) == 0) return;
+  for (int k = 0; k < interpolation_.num_points(); ++k)
+    interpolation_.adjoint(k, weights[0] * normals_.row(k).transpose(), u_bar);
+}
+
+int CombinedOutput::size(int frame) const {
+  int sum = 0;
+  for (const auto& part : parts_) sum += part->size(frame);
+  return sum;
+}
+
+VectorXd CombinedOutput::values(int frame, const State& state) const {
+  VectorXd out(size(frame));
+  Eigen::Index at = 0;
+  for (const auto& part : parts_) {
+    out.segment(at, part->size(frame)) = part->values(frame, state);
+    at += part->size(frame);
+  }
+  return out;
+}
+
+MatrixXd CombinedOutput::tangent(int frame, const State& state, const MatrixXd& du,
+                                 const MatrixXd& ds) const {
+  MatrixXd out(size(frame), du.cols());
+  Eigen::Index at = 0;
+  for (const auto& part : parts_) {
+    out.middleRows(at, part->size(frame)) = part->tangent(frame, state, du, ds);
+    at += part->size(frame);
+  }
+  return out;
+}
+
+void CombinedOutput::adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+                             VectorXd& s_bar) const {
+  Eigen::Index at = 0;
+  for (const auto& part : parts_) {
+    part->adjoint(frame, state, weights.segment(at, part->size(frame)), u_bar, s_bar);
+    at += part->size(frame);
+  }
+}
+
 }  // namespace rhytid::adjoint

@@ -5,6 +5,7 @@
 // to know.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "sim/time/model.h"
@@ -71,6 +72,37 @@ class PointPositions final : public Output {
  private:
   PointInterpolation interpolation_;
   int first_frame_;
+};
+
+/// Mean over material points of the displacement along the rest normal, mm: one value per frame from
+/// `first_frame` on.
+class MeanNormalDisplacement final : public Output {
+ public:
+  MeanNormalDisplacement(const SkinMesh& mesh, std::vector<MaterialPoint> points, int first_frame = 1);
+  int size(int frame) const override { return frame >= first_frame_ ? 1 : 0; }
+  VectorXd values(int frame, const State& state) const override;
+  MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const override;
+  void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+               VectorXd& s_bar) const override;
+
+ private:
+  PointInterpolation interpolation_;
+  MatrixX3 normals_;  ///< [points] unit, divided by the number of points
+  int first_frame_;
+};
+
+/// Several outputs, one after the other in every frame.
+class CombinedOutput final : public Output {
+ public:
+  explicit CombinedOutput(std::vector<std::shared_ptr<const Output>> parts) : parts_(std::move(parts)) {}
+  int size(int frame) const override;
+  VectorXd values(int frame, const State& state) const override;
+  MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const override;
+  void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+               VectorXd& s_bar) const override;
+
+ private:
+  std::vector<std::shared_ptr<const Output>> parts_;
 };
 
 }  // namespace rhytid::adjoint

@@ -20,6 +20,7 @@
 // Tests    tests/sim/terms/contact_law_test.cpp
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -90,6 +91,15 @@ struct ContactLaw {
 
   template <class T>
   void update(const T*, const T*, const T*, const double*, double, T*) const {}
+
+  static constexpr std::array<const char*, 3> regime_names = {"apart", "onset", "pressed"};
+  signed char regime(const double* u, const double*, const double* theta, const double* rest, double) const {
+    const double x[3] = {u[0] + rest[0] - theta[2], u[1] + rest[1] - theta[3], u[2] + rest[2] - theta[4]};
+    const LiftedGap<double> g = lift_gap(*shape, x);
+    const double depth = theta[1] + rest[3] - g.gap;
+    if (!g.supported || !(depth > 0)) return 0;
+    return depth < onset ? 1 : 2;
+  }
 };
 
 enum class Mollifier { quintic, quadratic };
@@ -162,6 +172,23 @@ struct FrictionLaw {
     if (!(value_of(length) > 0)) return;  // the centre of a sphere: no direction, hence no friction
     lag[0] = slope * length;
     for (int i = 0; i < 3; ++i) lag[1 + i] = g.gradient[i] / length;
+  }
+
+  static constexpr std::array<const char*, 3> regime_names = {"unloaded", "stick", "slip"};
+  signed char regime(const double* u, const double* prepared, const double* theta, const double*,
+                     double dt) const {
+    if (!(prepared[0] > 0)) return 0;
+    double slip[3], along = 0, s = 0;
+    for (int i = 0; i < 3; ++i) {
+      slip[i] = u[i] - prepared[4 + i] - (theta[3 + i] - theta[6 + i]);
+      along += slip[i] * prepared[1 + i];
+    }
+    for (int i = 0; i < 3; ++i) {
+      const double tangential = slip[i] - along * prepared[1 + i];
+      s += tangential * tangential;
+    }
+    const double eps = slip_speed * dt;
+    return s < eps * eps ? 1 : 2;
   }
 };
 

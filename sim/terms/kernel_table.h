@@ -24,6 +24,12 @@ struct KernelTable {
   void (*adjoint_step)(const void* law, const ElementView&, const double* u, const double* u_old,
                        const double* s_old, const double* prepared, const double* adj, const double* s_bar,
                        double* u_old_bar, double* s_old_bar, double* theta_bar);
+  /// Laws made of smooth pieces only (contact, friction): which piece each point is on, [num_points], and the
+  /// pieces' names; null and 0 for a law that is smooth everywhere.
+  void (*regime)(const void* law, const ElementView&, const double* u, const double* prepared,
+                 signed char* out) = nullptr;
+  int num_regimes = 0;
+  const char* const* regime_names = nullptr;
 };
 
 inline namespace RHYTID_ISA {
@@ -32,7 +38,7 @@ inline namespace RHYTID_ISA {
 template <class Law, class Kin>
 constexpr KernelTable kernel_table() {
   using K = PointKernel<Law, Kin>;
-  return {
+  KernelTable table = {
       Law::name,
       Law::ne,
       Law::ns,
@@ -60,6 +66,13 @@ constexpr KernelTable kernel_table() {
          const double* p, const double* adj, const double* sb, double* uob, double* sob, double* tb) {
         K::adjoint_step(*static_cast<const Law*>(l), v, u, uo, so, p, adj, sb, uob, sob, tb);
       }};
+  if constexpr (K::has_regimes) {
+    table.regime = [](const void* l, const ElementView& v, const double* u, const double* p,
+                      signed char* out) { K::regime(*static_cast<const Law*>(l), v, u, p, out); };
+    table.num_regimes = static_cast<int>(Law::regime_names.size());
+    table.regime_names = Law::regime_names.data();
+  }
+  return table;
 }
 
 }  // namespace RHYTID_ISA

@@ -235,6 +235,20 @@ struct PointKernel {
     }
   }
 
+  static constexpr bool has_regimes = requires { Law::regime_names; };
+
+  /// Which smooth piece of the law each point is on [nq].
+  static void regime(const Law& law, const ElementView& v, const double* u, const double* prepared,
+                     signed char* out) {
+    double natural[3][max_rows], z[nz], e[ne];
+    gather(v, u, natural);
+    for (int q = 0; q < v.num_points; ++q) {
+      point(v, natural, q, z);
+      Kin::strain(z, e);
+      out[q] = law.regime(e, prepared + q * np, theta(v, q), rest(v, q), v.dt);
+    }
+  }
+
   using Directions = Dual<kDirections>;
 
   /// A strain as a dual along kDirections nodal directions du [n][3][kDirections] (null = zero derivative).

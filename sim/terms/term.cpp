@@ -251,6 +251,24 @@ void Term::update(const StepInfo& step, const TermStepData& data, const VectorXd
   }
 }
 
+std::vector<signed char> Term::regimes(const StepInfo& step, const TermStepData& data,
+                                       const VectorXd& u) const {
+  if (!kernels_->regime) return {};
+  std::vector<signed char> result(num_points_);
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
+    const TermGroup& g = groups_[gi];
+    parallel_for(g.num_elements, [&](int e) {
+      double local[3 * 80];
+      gather_nodes(g, e, u.data(), 3, local);
+      const std::size_t p =
+          static_cast<std::size_t>(g.first_point) + static_cast<std::size_t>(e) * g.num_points;
+      kernels_->regime(law_.get(), view(g, static_cast<int>(gi), e, step, data), local,
+                       data.prepared.data() + p * kernels_->np, result.data() + p);
+    });
+  }
+  return result;
+}
+
 namespace {
 
 /// Displacement gradient H of an element at point q, row-major.

@@ -113,6 +113,9 @@ class Term {
                MatrixSink& sink) const;
   /// New history slice.
   void update(const StepInfo& step, const TermStepData& data, const VectorXd& u, double* s_new) const;
+  /// Which smooth piece of its law each point is on, [num_points], as numbered by kernels().regime_names;
+  /// empty when the law is smooth everywhere.
+  std::vector<signed char> regimes(const StepInfo& step, const TermStepData& data, const VectorXd& u) const;
   /// Largest s ≤ 1 with det(F + s dF) > 0 everywhere; +inf when the whole step is free.
   double feasible_step(const VectorXd& u, const VectorXd& d) const;
   /// Smallest J = det F over the points (prisms; +inf for surface terms).

@@ -1,95 +1,237 @@
-// Tangent and adjoint sweeps on a scene with contact, slip, viscosity and ligaments.
+// Tangent and adjoint sweeps: transposes of each other and derivatives of the simulation, for every damper
+// scheme and mollifier, with substeps, over twenty steps, without history; what is refused.
 #include "adjoint/sweeps.h"
 
 #include <gtest/gtest.h>
 
-#include <random>
-
-#include "sim/scene/load.h"
-#include "sim/scene/scene_model.h"
+#include "sim/core/parallel.h"
+#include "tests/adjoint/certified_case.h"
 #include "tests/support/small_scenes.h"
 
 namespace rhytid::adjoint {
 namespace {
 
-const std::vector<std::string> kAddresses = {"/ligaments/sources/left/strength",
-                                             "/ligaments/sources/right/strength",
-                                             "/ligaments/diffusion_time",
-                                             "/ligaments/stiffness",
-                                             "/skin/layers/soft/youngs_modulus",
-                                             "/skin/layers/film/youngs_modulus",
-                                             "/skin/layers/soft/relaxation_time",
-                                             "/skin/layers/film/relaxation_time",
-                                             "/skin/layers/soft/stiffening",
-                                             "/skin/layers/soft/relaxing_fraction",
-                                             "/colliders/finger/friction/coefficient"};
+std::vector<std::string> settings(std::vector<std::string> more = {}) {
+  more.insert(more.begin(), {"/skin/surface/grid/cells=[3,2]", "/skin/layers/soft/order=1"});
+  return more;
+}
 
-struct Case {
-  SceneModel scene_model;
-  RunOptions options;
-  Trajectory run;
-  explicit Case(const std::string& text)
-      : scene_model(parse_scene_text(text, "test.json")), options(scene_model.run_options()) {
-    options.minimiser.polish = true;
-    options.minimiser.relative_tolerance = 1e-10;
-    run = simulate(scene_model.model(), scene_model.native(), options);
+/// Largest |⟨Jv, w⟩ − ⟨v, Jᵀw⟩| over directions, relative to the larger of the sums or a hundredth of their
+/// terms.
+double duality(const CertifiedCase& c, const Output& output, const std::vector<VectorXd>& weights,
+               const MatrixXd& directions, const AdjointResult& adjoint) {
+  const auto tangent = tangent_sweep(c.model(), c.scene_model.native(), c.run, output, directions);
+  double worst = 0;
+  for (Eigen::Index k = 0; k < directions.cols(); ++k) {
+    double forward = 0, terms = 0;
+    for (int f = 0; f <= c.run.frames(); ++f) {
+      if (output.size(f) == 0) continue;
+      const VectorXd product = tangent.frames[f].col(k).cwiseProduct(weights[f]);
+      forward += product.sum();
+      terms += product.cwiseAbs().sum();
+    }
+    EXPECT_GT(terms, 0) << "direction " << k;
+    const double backward = directions.col(k).dot(adjoint.native_bar);
+    worst = std::max(worst, std::fabs(forward - backward) / std::max(std::fabs(forward), 1e-2 * terms));
   }
-  std::vector<MaterialPoint> points() const {
-    std::vector<MaterialPoint> p;
-    for (int f = 0; f < scene_model.model().mesh.num_faces; f += 3) p.push_back({f, 0.3, 0.4, true});
-    return p;
+  return worst;
+}
+
+std::vector<std::string> addresses_of(const CertifiedCase& c) {
+  std::vector<std::string> all;
+  for (const ParameterSpec& s : all_parameters(c.scene_model.scene()))
+    if (s.name != "finger radius") all.push_back(s.address);
+  return all;
+}
+
+/// Duality of every parameter's own direction and Taylor slopes along a random direction and the gradient.
+void expect_right_gradient(const CertifiedCase& c, const Output& output,
+                           const std::vector<VectorXd>& weights) {
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  const AdjointResult adjoint = adjoint_sweep(c.model(), c.scene_model.native(), c.run, output, weights);
+  std::vector<std::string> addresses;
+  for (const std::string& a : addresses_of(c))
+    if (ParameterSpace(c.scene_model, {a}).jacobian().col(0).dot(adjoint.native_bar) != 0)
+      addresses.push_back(a);
+  ASSERT_GE(addresses.size(), 5u);
+  const ParameterSpace space(c.scene_model, addresses);
+  const double transposes = duality(c, output, weights, space.jacobian(), adjoint);
+  EXPECT_LT(transposes, 1e-12);
+  const VectorXd gradient = space.jacobian().transpose() * adjoint.native_bar;
+  const FunctionalDifference functional(c.scene_model, c.run, output, weights, certificate_minimiser({}));
+  std::mt19937 rng(3);
+  std::normal_distribution<double> normal;
+  VectorXd random(space.size());
+  for (Eigen::Index k = 0; k < random.size(); ++k) random[k] = normal(rng) / std::fabs(gradient[k]);
+  const double noise = measure_noise(functional, space, random);
+  for (const VectorXd& direction : {random, gradient}) {
+    const TaylorSeries s = taylor_test(functional, space, direction, gradient, noise, {});
+    EXPECT_TRUE(s.passed) << s.sentence;
+    EXPECT_LT(s.first_order_error, 1e-5);
+    std::printf("duality %.1e, %s\n", transposes, s.sentence.c_str());
   }
-  MatrixXd directions() const {
-    MatrixXd d(scene_model.native().size(), kAddresses.size());
-    for (std::size_t k = 0; k < kAddresses.size(); ++k)
-      d.col(k) = scene_model.native_derivative(scene_model.scene(), kAddresses[k]);
-    return d;
+}
+
+class Variant : public testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(Variant, GradientIsRight) {
+  const CertifiedCase c(test::drag_scene(2, 10), settings(GetParam()));
+  expect_right_gradient(c, *c.output, c.weights);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Sweeps, Variant,
+    testing::Values(std::vector<std::string>{"/time/damper=exponential", "/time/frames=20"},
+                    std::vector<std::string>{"/time/damper=literal",
+                                             "/colliders/finger/friction/mollifier=quadratic"},
+                    std::vector<std::string>{"/time/damper=strang"},
+                    std::vector<std::string>{"/time/damper=backward_euler",
+                                             "/colliders/finger/friction/mollifier=quadratic"},
+                    std::vector<std::string>{"/time/substeps=2", "/time/frames=5", "/skin/rim=sliding"},
+                    // One layer relaxes, the other does not: two skin terms.
+                    std::vector<std::string>{"/skin/layers/film/relaxing_fraction=0", "/skin/rim=free"}));
+
+TEST(Sweeps, ElasticSceneHasNoHistory) {
+  const CertifiedCase c(test::drag_scene(2, 4), settings({"/skin/layers/soft/relaxing_fraction=0",
+                                                          "/skin/layers/film/relaxing_fraction=0",
+                                                          "/colliders/finger/friction/coefficient=0"}));
+  EXPECT_EQ(c.model().history_size(), 0u);
+  expect_right_gradient(c, *c.output, c.weights);
+}
+
+/// A mean square over displacement and history: nonlinear, and looks at all of the state.
+class MeanSquare final : public Output {
+ public:
+  int size(int frame) const override { return frame > 0 && frame % 2 == 0 ? 1 : 0; }
+  VectorXd values(int frame, const State& s) const override {
+    VectorXd out(size(frame));
+    if (out.size() > 0) out[0] = 0.5 * (s.u.squaredNorm() + 1e2 * s.history.squaredNorm());
+    return out;
+  }
+  MatrixXd tangent(int frame, const State& s, const MatrixXd& du, const MatrixXd& ds) const override {
+    MatrixXd out(size(frame), du.cols());
+    if (out.rows() > 0) out = s.u.transpose() * du + 1e2 * s.history.transpose() * ds;
+    return out;
+  }
+  void adjoint(int, const State& s, const VectorXd& w, VectorXd& u_bar, VectorXd& s_bar) const override {
+    u_bar += w[0] * s.u;
+    s_bar += 1e2 * w[0] * s.history;
   }
 };
 
-std::vector<VectorXd> random_weights(const Trajectory& run, const Output& output, unsigned seed) {
-  std::mt19937 rng(seed);
-  std::normal_distribution<double> n;
-  std::vector<VectorXd> w;
-  for (int f = 0; f <= run.frames(); ++f) {
-    w.emplace_back(output.size(f));
-    for (double& x : w.back()) x = n(rng);
-  }
-  return w;
+TEST(Sweeps, OutputsMayReadTheHistoryAndBeNonlinear) {
+  const CertifiedCase c(test::drag_scene(2, 6), settings());
+  const MeanSquare output;
+  expect_right_gradient(c, output, random_weights(output, c.run.frames(), 2));
 }
 
-TEST(Sweeps, TangentAndAdjointAreTransposes) {
-  for (const auto& [order, scheme, rim] :
-       {std::tuple{2, "stacked", "clamped"}, {3, "composite", "sliding"}}) {
-    Case c(test::drag_scene(order, 10, scheme, rim));
-    ASSERT_TRUE(c.run.complete) << c.run.failure;
-    const PointPositions output(c.scene_model.model().mesh, c.points());
-    const MatrixXd directions = c.directions();
-    const auto weights = random_weights(c.run, output, 5);
-    const auto tangent =
-        tangent_sweep(c.scene_model.model(), c.scene_model.native(), c.run, output, directions);
-    const auto adjoint = adjoint_sweep(c.scene_model.model(), c.scene_model.native(), c.run, output, weights);
-    VectorXd forward = VectorXd::Zero(directions.cols());
-    double scale = 0;
-    for (int f = 0; f <= c.run.frames(); ++f)
-      if (output.size(f) > 0) forward += tangent.frames[f].transpose() * weights[f];
-    const VectorXd backward = directions.transpose() * adjoint.native_bar;
-    for (int f = 0; f <= c.run.frames(); ++f)
-      if (output.size(f) > 0) scale = std::max(scale, tangent.frames[f].norm() * weights[f].norm());
-    for (Eigen::Index k = 0; k < forward.size(); ++k) {
-      EXPECT_NE(forward[k], 0.0) << kAddresses[k];
-      EXPECT_NEAR(forward[k], backward[k], 1e-11 * std::max(std::fabs(forward[k]), 1e-3 * scale))
-          << kAddresses[k];
-      std::printf("%-40s % .12e % .12e rel %.1e\n", kAddresses[k].c_str(), forward[k], backward[k],
-                  std::fabs(forward[k] - backward[k]) / std::fabs(forward[k]));
-    }
-    std::printf(
-        "residual max %.2e, adjoint error bar %.2e, steps %zu, forward %.2f s, tangent %.2f s, adjoint %.2f "
-        "s\n",
-        *std::max_element(adjoint.report.residual.begin(), adjoint.report.residual.end()),
-        adjoint.residual_error, c.run.steps.size(), c.run.seconds, tangent.report.seconds,
-        adjoint.report.seconds);
+const CertifiedCase& small_case() {
+  static const CertifiedCase c(test::drag_scene(2, 4), settings());
+  return c;
+}
+
+TEST(Sweeps, SameBitsAgainAndOnTwoThreads) {
+  const CertifiedCase& c = small_case();
+  ASSERT_TRUE(c.run.complete);
+  const int before = num_threads();
+  const MatrixXd directions = ParameterSpace(c.scene_model, addresses_of(c)).jacobian();
+  std::vector<AdjointResult> adjoints;
+  std::vector<TangentResult> tangents;
+  for (const int threads : {1, 1, 2}) {
+    set_num_threads(threads);
+    adjoints.push_back(adjoint_sweep(c.model(), c.scene_model.native(), c.run, *c.output, c.weights));
+    tangents.push_back(tangent_sweep(c.model(), c.scene_model.native(), c.run, *c.output, directions));
   }
+  set_num_threads(before);
+  for (const int other : {1, 2}) {
+    EXPECT_TRUE(adjoints[0].native_bar == adjoints[other].native_bar);
+    EXPECT_EQ(adjoints[0].residual_error, adjoints[other].residual_error);
+    for (int f = 0; f <= c.run.frames(); ++f)
+      EXPECT_TRUE(tangents[0].frames[f] == tangents[other].frames[f]) << f;
+  }
+}
+
+TEST(Sweeps, ManyDirectionsAreTheSameAsOneAtATime) {
+  const CertifiedCase& c = small_case();
+  const MatrixXd directions = ParameterSpace(c.scene_model, addresses_of(c)).jacobian();
+  ASSERT_GT(directions.cols(), 8);  // more than one chunk
+  const auto all = tangent_sweep(c.model(), c.scene_model.native(), c.run, *c.output, directions);
+  for (const Eigen::Index k : {Eigen::Index(2), directions.cols() - 1}) {
+    const auto one = tangent_sweep(c.model(), c.scene_model.native(), c.run, *c.output, directions.col(k));
+    for (int f = 1; f <= c.run.frames(); ++f)
+      EXPECT_LE((one.frames[f] - all.frames[f].col(k)).norm(), 1e-13 * all.frames[f].col(k).norm()) << f;
+  }
+}
+
+TEST(Sweeps, RefuseWhatHasNoGradient) {
+  const CertifiedCase& c = small_case();
+  const VectorXd native = c.scene_model.native();
+  const MatrixXd direction = VectorXd::Ones(native.size());
+  const auto expect_refused = [&](const VectorXd& parameters, const Trajectory& run, const std::string& why) {
+    try {
+      (void)adjoint_sweep(c.model(), parameters, run, *c.output, c.weights);
+      ADD_FAILURE() << "not refused: " << why;
+    } catch (const GradientError& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(why));
+    }
+    EXPECT_THROW((void)tangent_sweep(c.model(), parameters, run, *c.output, direction), GradientError) << why;
+  };
+  Trajectory broken = c.run;
+  broken.complete = false;
+  broken.failure = "stopped by the test";
+  expect_refused(native, broken, "stopped by the test");
+  broken = c.run;
+  for (StepRecord& step : broken.steps) step.state = {};
+  expect_refused(native, broken, "kept no states");
+  VectorXd negative = native;
+  for (const NativeBlock& block : c.model().native_blocks)
+    for (const int i : block.stiffness_like) negative[i] = -native[i];
+  expect_refused(negative, c.run, "not positive definite");
+  EXPECT_THROW(
+      (void)adjoint_sweep(c.model(), native, c.run, *c.output, std::vector<VectorXd>(c.weights.size() - 1)),
+      ContractError);
+}
+
+TEST(Resimulate, ReturnsToTheRunFromTheStateBefore) {
+  const CertifiedCase& c = small_case();
+  const Trajectory again = resimulate(c.model(), c.scene_model.native(), c.run, certificate_minimiser({}));
+  ASSERT_TRUE(again.complete) << again.failure;
+  ASSERT_EQ(again.frames(), c.run.frames());
+  for (int f = 1; f <= c.run.frames(); ++f)
+    EXPECT_LT((again.at_frame(f).u - c.run.at_frame(f).u).norm(), 1e-12 * c.run.at_frame(f).u.norm());
+}
+
+// ∂native/∂x of every parameter against central differences, which are exact but for h².
+TEST(ParameterSpace, JacobianIsTheDerivativeOfNative) {
+  const CertifiedCase& c = small_case();
+  const std::vector<ParameterSpec> all = all_parameters(c.scene_model.scene());
+  ASSERT_GE(all.size(), 15u);
+  for (const ParameterSpec& spec : all) {
+    const ParameterSpace space(c.scene_model, {spec.address});
+    ASSERT_EQ(space.size(), 1);
+    const VectorXd exact = space.jacobian().col(0);
+    ASSERT_GT(exact.norm(), 0) << spec.address;
+    double errors[2];
+    for (int k = 0; k < 2; ++k) {
+      const VectorXd x = VectorXd::Constant(1, k == 0 ? 2e-2 : 1e-2);
+      const VectorXd difference = (space.native(x) - space.native(-x)) / (2 * x[0]);
+      errors[k] = (difference - exact).norm() / exact.norm();
+    }
+    EXPECT_LT(errors[1], 1e-3) << spec.address;
+    if (errors[1] < 1e-11) continue;
+    EXPECT_NEAR(std::log2(errors[0] / errors[1]), 2, 0.05) << spec.address;
+  }
+}
+
+TEST(ParameterSpace, CoordinatesFollowTheTransforms) {
+  const CertifiedCase& c = small_case();
+  const ParameterSpace space(c.scene_model, {"/ligaments/stiffness", "/skin/layers/soft/relaxing_fraction"});
+  const std::vector<double> p = space.values((VectorXd(2) << std::log(2.0), 0).finished());
+  EXPECT_NEAR(p[0], 2 * c.scene_model.scene().ligaments->stiffness, 1e-18);
+  EXPECT_EQ(p[1], 0.8);
+  EXPECT_GT(space.values((VectorXd(2) << 0, 40).finished())[1], 0.99);
+  EXPECT_LE(space.values((VectorXd(2) << 0, 40).finished())[1], 0.999);
+  EXPECT_TRUE(space.native(VectorXd::Zero(2)) == c.scene_model.native());
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace rhytid::test {
 
@@ -40,6 +41,11 @@ inline std::string drag_scene(int order, int frames, const std::string& scheme =
   "time": {"frame_rate": "24 Hz", "frames": )" +
          std::to_string(frames) + R"(}
 })";
+}
+
+/// Settings that make the drag scene cheap: a coarser mesh, everything else as it is.
+inline std::vector<std::string> coarse() {
+  return {"/skin/surface/grid/cells=[4,3]"};
 }
 
 }  // namespace rhytid::test

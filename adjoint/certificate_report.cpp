@@ -1,0 +1,108 @@
+#include "adjoint/certificate_report.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace rhytid::adjoint {
+
+namespace {
+
+std::string line(const char* format, auto... values) {
+  char buffer[512];
+  std::snprintf(buffer, sizeof buffer, format, values...);
+  return std::string(buffer) + "\n";
+}
+
+const char* transform_name(ParameterTransform t) {
+  return t == ParameterTransform::log ? "log" : t == ParameterTransform::logit ? "logit" : "none";
+}
+
+}  // namespace
+
+std::string certificate_text(const CertificateReport& r) {
+  std::string out;
+  out += r.interrupted ? "The certificate was interrupted; what follows is what had been done.\n"
+         : r.passed()  ? "The gradient of this scene is certified: every check passed.\n"
+                       : "The gradient of this scene is NOT certified: a check failed.\n";
+  out += "\nverdict  check                                                  figure      limit\n";
+  for (const CertificateCheck& c : r.checks) {
+    out += line("%-8s %-52s %9.3g  %9.3g", name(c.verdict), c.name.c_str(), c.figure, c.threshold);
+    out += "         " + c.sentence + "\n";
+  }
+  out +=
+      "\nTaylor series: remainder |Q(p+hv) − Q(p) − h Q'v|, slope, points on another smooth piece than at "
+      "p\n";
+  for (const TaylorSeries& s : r.taylor) {
+    out += line("  %s, %s: Q'v = %.6g", s.group.c_str(), s.direction.c_str(), s.linear);
+    for (std::size_t k = 0; k < s.steps.size(); ++k)
+      out += k == 0 ? line("    h %.2e  %.3e           %6ld", s.steps[k], std::fabs(s.remainders[k]),
+                           s.switches[k])
+                    : line("    h %.2e  %.3e  %7.4f  %6ld", s.steps[k], std::fabs(s.remainders[k]),
+                           s.slopes[k - 1], s.switches[k]);
+  }
+  out += "\nparameter                                             value          dQ/d(coordinate)\n";
+  for (std::size_t k = 0; k < r.parameters.size(); ++k)
+    out += line("  %-50s %.6g %s (%s)  %.6e", r.parameters[k].address.c_str(), r.parameters[k].value,
+                r.parameters[k].unit.c_str(), transform_name(r.parameters[k].transform), r.gradient[k]);
+  for (const std::string& address : r.without_effect) out += "  " + address + "  no effect\n";
+  if (!r.regimes.empty()) out += "\npoints over all steps\n";
+  for (const RegimeCount& c : r.regimes)
+    out += line("  %-30s %-10s %10ld", c.term.c_str(), c.regime.c_str(), c.points);
+  out += "\nstep   time/s      smallest pivot  largest pivot   residual/N\n";
+  for (std::size_t i = 0; i < r.steps.smallest_pivot.size(); ++i)
+    out += line("%4zu   %-10.4g  %-14.4e  %-14.4e  %.2e", i, r.step_times[i], r.steps.smallest_pivot[i],
+                r.steps.largest_pivot[i], r.steps.residual[i]);
+  out += line(
+      "\nnoise of the functional %.1e; forward run %.2f s, adjoint %.2f s, tangent %.2f s, certificate %.2f "
+      "s",
+      r.noise, r.forward_seconds, r.adjoint_seconds, r.tangent_seconds, r.total_seconds);
+  return out;
+}
+
+nlohmann::json certificate_json(const CertificateReport& r) {
+  nlohmann::json j;
+  j["passed"] = r.passed();
+  j["interrupted"] = r.interrupted;
+  for (auto* list : {"checks", "taylor", "parameters", "points"}) j[list] = nlohmann::json::array();
+  for (const CertificateCheck& c : r.checks)
+    j["checks"].push_back({{"name", c.name},
+                           {"figure", c.figure},
+                           {"limit", c.threshold},
+                           {"verdict", c.verdict == Verdict::pass      ? "pass"
+                                       : c.verdict == Verdict::warning ? "warning"
+                                                                       : "fail"},
+                           {"sentence", c.sentence}});
+  for (const TaylorSeries& s : r.taylor)
+    j["taylor"].push_back({{"group", s.group},
+                           {"direction", s.direction},
+                           {"linear", s.linear},
+                           {"steps", s.steps},
+                           {"remainders", s.remainders},
+                           {"slopes", s.slopes},
+                           {"switches", s.switches},
+                           {"noise", s.noise},
+                           {"first_order_error", s.first_order_error},
+                           {"passed", s.passed}});
+  for (std::size_t k = 0; k < r.parameters.size(); ++k)
+    j["parameters"].push_back({{"address", r.parameters[k].address},
+                               {"value", r.parameters[k].value},
+                               {"unit", r.parameters[k].unit},
+                               {"transform", transform_name(r.parameters[k].transform)},
+                               {"gradient", r.gradient[k]}});
+  j["without_effect"] = r.without_effect;
+  for (const RegimeCount& c : r.regimes)
+    j["points"].push_back({{"term", c.term}, {"regime", c.regime}, {"points", c.points}});
+  j["steps"] = {{"time", r.step_times},
+                {"smallest_pivot", r.steps.smallest_pivot},
+                {"largest_pivot", r.steps.largest_pivot},
+                {"residual", r.steps.residual}};
+  j["noise"] = r.noise;
+  j["error_bar"] = r.error_bar;
+  j["seconds"] = {{"forward", r.forward_seconds},
+                  {"tangent", r.tangent_seconds},
+                  {"adjoint", r.adjoint_seconds},
+                  {"certificate", r.total_seconds}};
+  return j;
+}
+
+}  // namespace rhytid::adjoint

@@ -1,0 +1,61 @@
+#include "adjoint/resimulate.h"
+
+#include <chrono>
+
+namespace rhytid::adjoint {
+
+Trajectory resimulate(const Model& model, const VectorXd& native, const Trajectory& reference,
+                      const MinimiserOptions& options, const StartGuess& guess,
+                      const ResimulationObserver& observer, bool keep_history) {
+  const auto start = std::chrono::steady_clock::now();
+  Trajectory run;
+  run.initial = reference.initial;
+  State current = run.initial;
+  BlockMatrix matrix(model.pattern());
+  CholeskyFactor factor(model.pattern());
+  for (int i = 0; i < static_cast<int>(reference.steps.size()); ++i) {
+    const StepRecord& known = reference.steps[i];
+    StepProblem problem(model, native, known.step, current);
+    VectorXd q;
+    MinimiserReport report;
+    if (guess) {
+      q = model.to_unknowns(guess(i, current));
+      report = minimise(problem, q, options, factor, matrix);
+    }
+    if (!report.converged()) {
+      q = model.to_unknowns(current.u);
+      report = minimise(problem, q, options, factor, matrix);
+    }
+    if (!report.converged()) {
+      run.failure = "step " + std::to_string(i) + ": " + name(report.status) + " after " +
+                    std::to_string(report.iterations) + " iterations";
+      break;
+    }
+    State next = problem.advance(model.to_displacement(q));
+    if (observer && !observer(i, problem, next)) {
+      run.failure = "stopped";
+      break;
+    }
+    StepRecord record{known.step, known.frame, known.bisections, next, std::move(report)};
+    if (!keep_history) record.state.history.resize(0);
+    current = std::move(next);
+    run.steps.push_back(std::move(record));
+  }
+  run.complete = run.steps.size() == reference.steps.size() && reference.complete;
+  for (const int end : reference.frame_end)
+    if (end <= static_cast<int>(run.steps.size())) run.frame_end.push_back(end);
+  run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return run;
+}
+
+std::vector<signed char> step_regimes(const StepProblem& problem, const VectorXd& u) {
+  std::vector<signed char> all;
+  const std::vector<Term>& terms = problem.model().terms;
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    const std::vector<signed char> own = terms[t].regimes(problem.step(), problem.data(t), u);
+    all.insert(all.end(), own.begin(), own.end());
+  }
+  return all;
+}
+
+}  // namespace rhytid::adjoint

@@ -1,0 +1,176 @@
+#include "adjoint/taylor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "sim/core/error.h"
+
+namespace rhytid::adjoint {
+
+namespace {
+
+constexpr double kNoiseStep = 1e-8;  // h² is then below rounding, yet the solver has work to do
+
+/// Whether the last `count` slopes lie in the window.
+bool is_clean(const TaylorSeries& series, const TaylorOptions& options, int count) {
+  if (static_cast<int>(series.slopes.size()) < count) return false;
+  return std::all_of(series.slopes.end() - count, series.slopes.end(),
+                     [&](double s) { return s >= options.smallest_slope && s <= options.largest_slope; });
+}
+
+std::string text(const char* format, auto... values) {
+  char buffer[320];
+  std::snprintf(buffer, sizeof buffer, format, values...);
+  return buffer;
+}
+
+void judge(TaylorSeries& s, const TaylorOptions& options, int wanted, bool at_noise,
+           const std::string& failure) {
+  const std::size_t n = s.remainders.size();
+  if (n >= 2) {
+    // ρ = c₁h + c₂h² through the last two points.
+    const double h = s.steps[n - 2], q = s.steps[n - 1] / h;
+    const double c1 = (s.remainders[n - 1] / (q * q) - s.remainders[n - 2]) / (h * (1 / q - 1));
+    s.first_order_error = std::fabs(c1) / std::max(std::fabs(s.linear), 1e-300);
+  }
+  s.passed = failure.empty() && is_clean(s, options, wanted);
+  if (!failure.empty()) {
+    s.sentence = "the run could not be repeated at a nearby parameter: " + failure;
+  } else if (s.passed) {
+    s.sentence = text(
+        "slopes between %.3f and %.3f from h = %.1e down to %.1e, where %ld contact or stick points switch; "
+        "the "
+        "gradient is right to %.0e",
+        *std::min_element(s.slopes.end() - wanted, s.slopes.end()),
+        *std::max_element(s.slopes.end() - wanted, s.slopes.end()), s.steps[s.steps.size() - wanted - 1],
+        s.steps.back(), s.switches.back(), s.first_order_error);
+  } else if (at_noise) {
+    s.sentence = text(
+        "no %d slopes in the window before the remainder (%.1e at h = %.1e) sank to the noise of the "
+        "functional (%.1e)",
+        wanted, std::fabs(s.remainders.back()), s.steps.back(), s.noise);
+  } else {
+    const double last = s.slopes.empty() ? 0 : s.slopes.back();
+    s.sentence = text(
+        "slope %.3f at h = %.1e where a right gradient gives 2; %ld contact or stick points switch; relative "
+        "error of the gradient about %.0e",
+        last, s.steps.empty() ? 0 : s.steps.back(), s.switches.empty() ? 0L : s.switches.back(),
+        s.first_order_error);
+  }
+}
+
+}  // namespace
+
+FunctionalDifference::FunctionalDifference(const SceneModel& scene_model, const Trajectory& run,
+                                           const Output& output, const std::vector<VectorXd>& weights,
+                                           const MinimiserOptions& minimiser)
+    : scene_model_(&scene_model), run_(&run), output_(&output), weights_(&weights), minimiser_(minimiser) {
+  require(run.complete, "FunctionalDifference: the run must be complete");
+  require(static_cast<int>(weights.size()) == run.frames() + 1,
+          "FunctionalDifference: weights for every frame");
+  for (int f = 0; f <= run.frames(); ++f) values_.push_back(output.values(f, run.at_frame(f)));
+  const VectorXd native = scene_model.native();
+  for (int i = 0; i < static_cast<int>(run.steps.size()); ++i) {
+    const StepProblem problem(model(), native, run.steps[i].step, run.before(i));
+    regimes_.push_back(step_regimes(problem, run.steps[i].state.u));
+  }
+}
+
+double FunctionalDifference::frame_difference(int frame, const State& state) const {
+  if (output_->size(frame) == 0) return 0;
+  return (*weights_)[frame].dot(output_->values(frame, state) - values_[frame]);
+}
+
+double FunctionalDifference::difference(const Trajectory& other) const {
+  double sum = 0;
+  for (int f = 1; f <= run_->frames(); ++f) sum += frame_difference(f, other.at_frame(f));
+  return sum;
+}
+
+FunctionalDifference::Result FunctionalDifference::evaluate(const VectorXd& native, const StartGuess& guess,
+                                                            const std::function<bool()>& go_on) const {
+  Result result;
+  int frame = 1;
+  const auto observe = [&](int step, const StepProblem& problem, const State& state) {
+    const std::vector<signed char> now = step_regimes(problem, state.u);
+    for (std::size_t q = 0; q < now.size(); ++q) result.switches += now[q] != regimes_[step][q];
+    for (; frame <= run_->frames() && run_->frame_end[frame] == step + 1; ++frame)
+      result.difference += frame_difference(frame, state);
+    return !go_on || go_on();
+  };
+  const auto nominal = [this](int step, const State&) { return run_->steps[step].state.u; };
+  result.run = resimulate(model(), native, *run_, minimiser_, guess ? guess : StartGuess(nominal), observe);
+  result.complete = result.run.complete;
+  result.failure = result.run.failure;
+  for (const StepRecord& record : result.run.steps) result.iterations += record.report.iterations;
+  return result;
+}
+
+double measure_noise(const FunctionalDifference& functional, const ParameterSpace& space,
+                     const VectorXd& direction, const std::function<bool()>& go_on) {
+  const VectorXd v = direction * (kNoiseStep / direction.cwiseAbs().maxCoeff());
+  const auto whole = functional.evaluate(space.native(v), {}, go_on);
+  const auto half = functional.evaluate(space.native(0.5 * v), {}, go_on);
+  return std::fabs(whole.difference - 2 * half.difference);
+}
+
+TaylorSeries taylor_test(const FunctionalDifference& functional, const ParameterSpace& space,
+                         const VectorXd& direction, const VectorXd& gradient, double noise,
+                         const TaylorOptions& options, const std::function<bool()>& go_on) {
+  require(direction.size() == space.size() && gradient.size() == space.size(),
+          "taylor_test: one component per parameter");
+  require(direction.cwiseAbs().maxCoeff() > 0, "taylor_test: the direction is zero");
+  const VectorXd v = direction / direction.cwiseAbs().maxCoeff();
+  TaylorSeries series;
+  series.linear = gradient.dot(v);
+  std::string failure;
+  Trajectory last;
+  double last_step = 0;
+  // Displacements change linearly but for O(h²): start from the last evaluation, scaled.
+  const auto at = [&](double h) {
+    StartGuess guess;
+    if (last.complete)
+      guess = [&, scale = h / last_step](int step, const State&) {
+        const VectorXd& u = functional.run().steps[step].state.u;
+        return VectorXd(u + scale * (last.steps[step].state.u - u));
+      };
+    FunctionalDifference::Result r = functional.evaluate(space.native(h * v), guess, go_on);
+    if (!r.complete) failure = r.failure;
+    last = std::move(r.run);
+    last_step = h;
+    return std::pair(r.difference - h * series.linear, r.switches);
+  };
+
+  const auto evaluate = [&](double h) {
+    const auto [remainder, switches] = at(h);
+    if (!failure.empty()) return false;
+    if (!series.steps.empty())
+      series.slopes.push_back(std::log(std::fabs(series.remainders.back() / remainder)) /
+                              std::log(series.steps.back() / h));
+    series.steps.push_back(h);
+    series.remainders.push_back(remainder);
+    series.switches.push_back(switches);
+    return true;
+  };
+
+  series.noise = noise;
+  int wanted = options.clean_slopes;
+  bool at_noise = false;
+  double h = options.first_step;
+  for (int k = 0; k < options.max_evaluations && !at_noise && evaluate(h); ++k) {
+    if (is_clean(series, options, wanted)) break;
+    at_noise = std::fabs(series.remainders.back()) < options.noise_factor * noise;
+    h /= series.switches.back() > options.many_switches ? 8 : 2;
+  }
+  if (failure.empty() && is_clean(series, options, wanted)) {
+    // A small error of the gradient hides below a large parabola: once more as far down as the noise allows.
+    const double curvature = std::fabs(series.remainders.back()) / (h * h);
+    const double deep = std::max(h / 1024, std::sqrt(1e3 * noise / curvature));
+    if (deep < h / 8 && evaluate(deep)) ++wanted;
+  }
+  judge(series, options, wanted, at_noise, failure);
+  return series;
+}
+
+}  // namespace rhytid::adjoint

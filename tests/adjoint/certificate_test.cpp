@@ -1,0 +1,227 @@
+// The certificate on a scene with contact, slip, stick, viscosity and ligaments over ten steps, for every
+// class of parameters; and that it notices wrong gradients.
+#include "adjoint/certificate.h"
+
+#include <gtest/gtest.h>
+
+#include "adjoint/certificate_report.h"
+#include "sim/core/parallel.h"
+#include "tests/adjoint/certified_case.h"
+#include "tests/support/small_scenes.h"
+
+namespace rhytid::adjoint {
+namespace {
+
+/// Sources, diffusion time, k; per layer Young's modulus and relaxation time; μ and K apart (Poisson's ratio
+/// and the relaxing fraction move them separately); friction.
+const std::vector<ParameterGroup> kClasses = {
+    {"source strengths", {"/ligaments/sources/left/strength", "/ligaments/sources/right/strength"}},
+    {"diffusion time", {"/ligaments/diffusion_time"}},
+    {"ligament k", {"/ligaments/stiffness"}},
+    {"Young's moduli", {"/skin/layers/soft/youngs_modulus", "/skin/layers/film/youngs_modulus"}},
+    {"soft modulus", {"/skin/layers/soft/youngs_modulus"}},
+    {"film modulus", {"/skin/layers/film/youngs_modulus"}},
+    {"relaxation times", {"/skin/layers/soft/relaxation_time", "/skin/layers/film/relaxation_time"}},
+    {"bulk and shear", {"/skin/layers/soft/poissons_ratio", "/skin/layers/soft/relaxing_fraction"}},
+    {"friction", {"/colliders/finger/friction/coefficient"}},
+};
+
+std::vector<std::string> required_addresses() {
+  std::vector<std::string> all;
+  for (const ParameterGroup& g : kClasses)
+    if (g.name != "soft modulus" && g.name != "film modulus")
+      all.insert(all.end(), g.addresses.begin(), g.addresses.end());
+  return all;
+}
+
+void expect_all_features(const CertifiedCase& c, const CertificateReport& report) {
+  ASSERT_GE(c.run.steps.size(), 10u);
+  EXPECT_GT(points_in(report, "contact finger", "pressed"), 50);
+  EXPECT_GT(points_in(report, "contact finger", "onset"), 5);
+  EXPECT_GT(points_in(report, "friction finger", "slip"), 50);
+  EXPECT_GT(points_in(report, "friction finger", "stick"), 10);
+  EXPECT_GT(points_in(report, "base contact", "pressed"), 50);
+  // C^v − I of the skin: the first slices of the history.
+  ASSERT_EQ(c.model().terms[0].name(), "skin");
+  const auto skin = static_cast<Eigen::Index>(c.model().terms[0].history_size());
+  EXPECT_GT(c.run.steps.back().state.history.head(skin).cwiseAbs().maxCoeff(), 1e-3);
+}
+
+void expect_sharp(const CertificateReport& report) {
+  EXPECT_TRUE(report.passed());
+  ASSERT_FALSE(report.taylor.empty());
+  for (const TaylorSeries& s : report.taylor) {
+    const std::string what = s.group + ", " + s.direction;
+    EXPECT_TRUE(s.passed) << what << ": " << s.sentence;
+    EXPECT_NE(s.linear, 0) << what;
+    ASSERT_GE(s.slopes.size(), 3u) << what;
+    for (std::size_t k = s.slopes.size() - 3; k < s.slopes.size(); ++k) {
+      EXPECT_GT(s.slopes[k], 1.95) << what;
+      EXPECT_LT(s.slopes[k], 2.05) << what;
+    }
+    // The noise must not have decided.
+    EXPECT_GT(std::fabs(s.remainders.back()), 10 * report.noise) << what;
+    EXPECT_LT(s.first_order_error, 1e-6) << what;
+  }
+  for (const CertificateCheck& c : report.checks) {
+    if (c.name == "duality") {
+      EXPECT_LT(c.figure, 1e-13);
+    } else if (c.name == "gauge identity") {
+      EXPECT_LT(c.figure, 1e-12);
+    }
+  }
+}
+
+TEST(Certificate, StackedClampedEveryParameterClass) {
+  CertifiedCase c(test::drag_scene(2, 10), test::coarse());
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  CertificateOptions options;
+  options.addresses = required_addresses();
+  options.groups = kClasses;
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  print(report);
+  expect_all_features(c, report);
+  expect_sharp(report);
+  EXPECT_EQ(report.parameters.size(), options.addresses.size());
+  // Two directions for groups of several parameters, one for the others.
+  EXPECT_EQ(report.taylor.size(), 2u + 4 * 2 + 5);
+}
+
+TEST(Certificate, CompositeSlidingAllParameters) {
+  CertifiedCase c(test::drag_scene(3, 10, "composite", "sliding"), test::coarse());
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights);
+  print(report);
+  expect_all_features(c, report);
+  expect_sharp(report);
+  EXPECT_EQ(report.parameters.size(), all_parameters(c.scene_model.scene()).size());
+  EXPECT_TRUE(report.without_effect.empty());
+}
+
+/// A small case for what needs no fine mesh, run once.
+const CertifiedCase& small_case() {
+  static const CertifiedCase c(test::drag_scene(2, 6),
+                               {"/skin/surface/grid/cells=[3,2]", "/skin/layers/soft/order=1"});
+  return c;
+}
+
+const CertificateCheck& check(const CertificateReport& report, const std::string& name) {
+  for (const CertificateCheck& c : report.checks)
+    if (c.name == name) return c;
+  throw std::runtime_error("no check " + name);
+}
+
+const NativeBlock& model_block(const CertifiedCase& c, const std::string& name) {
+  return c.model().native_block(name);
+}
+
+// A certificate that cannot fail says nothing: one block of the gradient off by a thousandth.
+TEST(Certificate, NoticesAWrongAdjoint) {
+  const CertifiedCase& c = small_case();
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  for (const char* block : {"layer/soft", "ligaments/b", "collider/finger"}) {
+    CertificateOptions options;
+    options.adjoint = [block](const Model& model, const auto&... rest) {
+      AdjointResult result = adjoint_sweep(model, rest...);
+      const NativeBlock& b = model.native_block(block);
+      result.native_bar.segment(b.offset, b.size) *= 1.001;
+      return result;
+    };
+    const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+    EXPECT_FALSE(report.passed()) << block;
+    EXPECT_EQ(check(report, "duality").verdict, Verdict::fail) << block;
+    // The random direction gives every parameter a like share; the gradient is that of the finger's radius.
+    for (const TaylorSeries& s : report.taylor)
+      EXPECT_EQ(s.passed, s.direction == "gradient" && std::string(block) != "collider/finger") << block;
+    const bool has_stiffness = !model_block(c, block).stiffness_like.empty();
+    EXPECT_EQ(check(report, "gauge identity").verdict, has_stiffness ? Verdict::fail : Verdict::pass)
+        << block;
+  }
+}
+
+// Both sweeps wrong in the same way: duality cannot see it, the Taylor test must.
+TEST(Certificate, NoticesConsistentlyWrongSweeps) {
+  const CertifiedCase& c = small_case();
+  for (const char* block : {"ligaments/b", "layer/film"}) {
+    CertificateOptions options;
+    options.each_parameter = true;
+    options.addresses = {"/ligaments/sources/left/strength", "/skin/layers/film/relaxation_time"};
+    options.adjoint = [block](const Model& model, const auto&... rest) {
+      AdjointResult result = adjoint_sweep(model, rest...);
+      const NativeBlock& b = model.native_block(block);
+      result.native_bar.segment(b.offset, b.size) *= 0.99;
+      return result;
+    };
+    options.tangent = [block](const Model& model, const VectorXd& native, const Trajectory& run,
+                              const Output& output, MatrixXd directions) {
+      const NativeBlock& b = model.native_block(block);
+      directions.middleRows(b.offset, b.size) *= 0.99;
+      return tangent_sweep(model, native, run, output, directions);
+    };
+    const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+    EXPECT_FALSE(report.passed()) << block;
+    EXPECT_EQ(check(report, "duality").verdict, Verdict::pass) << block;
+    const std::string own = block == std::string("ligaments/b") ? "left strength" : "film relaxation_time";
+    for (const TaylorSeries& s : report.taylor)
+      if (s.group == own) {
+        EXPECT_FALSE(s.passed) << own;
+        EXPECT_LT(s.slopes.back(), 1.5) << own;
+        EXPECT_NEAR(s.first_order_error, 0.01, 0.002) << own;
+      }
+  }
+}
+
+TEST(Certificate, NoticesSweepsThatDoNotRepeat) {
+  const CertifiedCase& c = small_case();
+  CertificateOptions options;
+  options.addresses = {"/ligaments/stiffness"};
+  int calls = 0;
+  options.adjoint = [&calls](const auto&... arguments) {
+    AdjointResult result = adjoint_sweep(arguments...);
+    result.native_bar[0] *= 1 + 1e-15 * calls++;
+    return result;
+  };
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  EXPECT_EQ(check(report, "repeatability").verdict, Verdict::fail);
+}
+
+TEST(Certificate, StopsWhenAskedAndSaysSo) {
+  const CertifiedCase& c = small_case();
+  const auto stop = [](const std::string& part, int done, int) {
+    return part != "Taylor test of joint, random" || done < 3;
+  };
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, {}, stop);
+  EXPECT_TRUE(report.interrupted);
+  EXPECT_FALSE(report.passed());
+  EXPECT_EQ(check(report, "duality").verdict, Verdict::pass);
+  EXPECT_TRUE(report.taylor.empty());
+}
+
+TEST(Certificate, ParametersWithoutEffectAreNamed) {
+  CertifiedCase c(test::drag_scene(2, 2),
+                  {"/skin/surface/grid/cells=[3,2]", "/skin/layers/film/relaxing_fraction=0"});
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights);
+  EXPECT_THAT(report.without_effect, testing::Contains("/skin/layers/film/relaxation_time"));
+  CertificateOptions unknown;
+  unknown.addresses = {"/ligaments/stiffnes"};
+  EXPECT_THROW((void)certify(c.scene_model, c.run, *c.output, c.weights, unknown), InputError);
+}
+
+TEST(Certificate, TextAndJsonAgree) {
+  const CertifiedCase& c = small_case();
+  CertificateOptions options;
+  options.addresses = {"/skin/layers/film/youngs_modulus"};
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  const std::string text = certificate_text(report);
+  const nlohmann::json json = nlohmann::json::parse(certificate_json(report).dump());
+  EXPECT_EQ(json["passed"], report.passed());
+  EXPECT_NE(text.find(report.passed() ? "is certified" : "NOT certified"), std::string::npos);
+  ASSERT_EQ(json["checks"].size(), report.checks.size());
+  for (const CertificateCheck& one : report.checks) EXPECT_NE(text.find(one.sentence), std::string::npos);
+  EXPECT_EQ(json["taylor"][0]["remainders"].size(), report.taylor[0].steps.size());
+  EXPECT_EQ(json["steps"]["smallest_pivot"].size(), c.run.steps.size());
+}
+
+}  // namespace
+}  // namespace rhytid::adjoint
