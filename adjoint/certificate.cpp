@@ -18,8 +18,8 @@ namespace {
 
 struct Stopped {};
 
-constexpr double kSmallestShare =
-    1e-6;  // of the largest slope: parameters below it are not scaled up further
+// Of the largest slope: parameters below it are not scaled up further.
+constexpr double kSmallestShare = 1e-4;
 
 std::string text(const char* format, auto... values) {
   char buffer[400];
@@ -173,6 +173,9 @@ void Certification::taylor() {
   }
   for (const auto& [key, points] : counts) report_.regimes.push_back({key.first, key.second, points});
 
+  if (addresses_.empty())
+    add({"Taylor slope", 0, 2, Verdict::fail,
+         "no parameter has an effect on the functional: nothing to test"});
   std::vector<ParameterGroup> groups{{"joint", addresses_}};
   groups.insert(groups.end(), options_.groups.begin(), options_.groups.end());
   if (options_.each_parameter)

@@ -88,7 +88,8 @@ TEST(Certificate, StackedClampedEveryParameterClass) {
 }
 
 TEST(Certificate, CompositeSlidingAllParameters) {
-  CertifiedCase c(test::drag_scene(3, 10, "composite", "sliding"), test::coarse());
+  CertifiedCase c(test::drag_scene(3, 10, "composite", "sliding"),
+                  {"/skin/surface/grid/cells=[3,2]", "/skin/composite_order=2"});
   ASSERT_TRUE(c.run.complete) << c.run.failure;
   const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights);
   print(report);
@@ -203,6 +204,9 @@ TEST(Certificate, ParametersWithoutEffectAreNamed) {
   ASSERT_TRUE(c.run.complete) << c.run.failure;
   const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights);
   EXPECT_THAT(report.without_effect, testing::Contains("/skin/layers/film/relaxation_time"));
+  CertificateOptions nothing;
+  nothing.addresses = {"/skin/layers/film/relaxation_time"};
+  EXPECT_FALSE(certify(c.scene_model, c.run, *c.output, c.weights, nothing).passed());
   CertificateOptions unknown;
   unknown.addresses = {"/ligaments/stiffnes"};
   EXPECT_THROW((void)certify(c.scene_model, c.run, *c.output, c.weights, unknown), InputError);
