@@ -1,0 +1,167 @@
+// A whole report from a synthetic fit: well formed, self-contained, with the numbers of the fit; and what it
+// does when files are missing. RHYTID_REPORT_FOLDER keeps the report for looking at.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+
+#include "sim/core/error.h"
+#include "sim/output/text.h"
+#include "sim/scene/parameter.h"
+#include "tests/tools/report/html_checker.h"
+#include "tests/tools/report/synthetic_fit.h"
+#include "tools/report/report_data.h"
+#include "tools/report/sections.h"
+#include "tools/report/write_report.h"
+
+namespace rhytid::tools {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+namespace fs = std::filesystem;
+
+std::string folder_for(const std::string& name) {
+  const char* kept = std::getenv("RHYTID_REPORT_FOLDER");
+  return (kept ? std::string(kept) : testing::TempDir() + "/rhytid_report") + "_" + name;
+}
+
+size_t count(const std::string& text, const std::string& part) {
+  size_t n = 0;
+  for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+/// The page without its pictures, in whose base64 any short word may turn up.
+std::string without_pictures(std::string html) {
+  const std::string mark = ";base64,";
+  for (size_t at = html.find(mark); at != std::string::npos; at = html.find(mark, at + mark.size()))
+    html.erase(at + mark.size(), html.find('"', at) - at - mark.size());
+  return html;
+}
+
+ReportOutcome report(const std::string& folder, bool run) {
+  std::ostringstream log;
+  Progress progress(ProgressStyle::plain_lines, log);
+  return write_report(folder, progress, {.run = run});
+}
+
+TEST(Report, HoldsTheWholeFit) {
+  const std::string folder = folder_for("whole");
+  const fitting::FitResult fit = test::write_synthetic_fit(folder, 4);
+  const ReportOutcome outcome = report(folder, true);
+  EXPECT_THAT(outcome.left_out, testing::IsEmpty());
+  const std::string page = read_file(outcome.path);
+  EXPECT_EQ(test::html_complaint(page), "");
+  EXPECT_LT(page.size(), 6u << 20);
+  const std::string html = without_pictures(page);
+  EXPECT_THAT(html, AllOf(Not(HasSubstr("http")), Not(HasSubstr("nan")), HasSubstr("<html lang=\"en\">")));
+
+  // Words and numbers.
+  EXPECT_THAT(html, HasSubstr("Fit of drag &lt;twin&gt; &amp; &quot;marks&quot;"));
+  EXPECT_THAT(
+      html,
+      HasSubstr("film youngs_modulus: 1.013 MPa (95 % interval 0.9741 to 1.053 MPa). The truth is 1 MPa "
+                "(the estimate is off by +1.3 %): inside the interval."));
+  EXPECT_THAT(html, HasSubstr("outside the interval"));  // right strength
+  EXPECT_THAT(html, HasSubstr(xml_escaped(fit.gauge)));
+  EXPECT_THAT(html, HasSubstr("too short &lt;for it&gt;"));
+  for (const auto& p : fit.parameters)
+    EXPECT_THAT(html, HasSubstr("<strong>" + short_text(p.value, 7) + "</strong>"));
+  EXPECT_THAT(html, HasSubstr("left strength and right strength trade off (correlation -0.86)"));
+  EXPECT_THAT(html, HasSubstr("hardly notices when left strength rises"));
+  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">22</th>"));  // the track that slipped is the worst
+  EXPECT_THAT(html, HasSubstr("rhytid report " + folder));
+  EXPECT_THAT(html, HasSubstr("exponential"));
+
+  // Pictures: two maps, shaded skin, height, slide; overlay and frame of the footage; five plots.
+  EXPECT_EQ(count(html, "src=\"data:image/png;base64,"), 5u);
+  EXPECT_EQ(count(html, "src=\"data:image/jpeg;base64,"), 2u);
+  EXPECT_EQ(count(html, "<svg"), 5u);
+}
+
+TEST(Report, IsTheSameTwice) {
+  const std::string folder = folder_for("twice");
+  test::write_synthetic_fit(folder, 1);
+  const std::string first = read_file(report(folder, false).path);
+  EXPECT_EQ(read_file(report(folder, false).path), first);
+}
+
+TEST(Report, MissingFilesAreNamedNotFatal) {
+  const std::string folder = folder_for("missing");
+  test::write_synthetic_fit(folder, 1);
+  for (const char* name : {"scene.json", "camera.yaml", "footage.avi"}) fs::remove(fs::path(folder) / name);
+  const ReportOutcome outcome = report(folder, true);
+  EXPECT_EQ(outcome.left_out.size(), 3u);
+  const std::string html = read_file(outcome.path);
+  EXPECT_EQ(test::html_complaint(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("scene.json: the scene file is not there"),
+                          HasSubstr("footage.avi is not there"), HasSubstr("the footage could not be read")));
+  fs::remove(fs::path(folder) / "fit.json");
+  EXPECT_THROW(report(folder, true), InputError);
+}
+
+TEST(Report, AFitThatEndedEarlyHasAPageToo) {
+  const std::string folder = folder_for("early");
+  fs::create_directories(folder);
+  fitting::FitResult fit;
+  fit.status = "failed: the forward run at the initial values did not converge";
+  fitting::FittedParameter p = test::fitted("/a", "a <name>", "MPa", 1, 1, NAN, 1);
+  p.determined = false, p.truth.reset();
+  fit.parameters = {p};
+  fitting::write_fit_result(fit, folder);
+  const std::string html = without_pictures(read_file(report(folder, true).path));
+  EXPECT_EQ(test::html_complaint(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("Not converged: failed: the forward run"), HasSubstr("not determined")));
+}
+
+TEST(Report, FindsFilesAfterTheFolderMoved) {
+  const std::string folder = folder_for("before_move"), moved = folder_for("after_move");
+  test::write_synthetic_fit(folder, 1);
+  fs::remove_all(moved);
+  fs::rename(folder, moved);
+  const ReportData data = gather_report_data(moved);
+  EXPECT_THAT(data.left_out, testing::IsEmpty());
+  EXPECT_TRUE(data.model && data.camera && !data.footage.empty());
+  // The scene of the pictures has the fitted values.
+  EXPECT_EQ(get_parameter(data.model->scene(), "/skin/layers/film/youngs_modulus"), 1.013);
+}
+
+TEST(LigamentDeviation, IsThePropagatedCovariance) {
+  const std::string folder = folder_for("deviation");
+  fitting::FitResult fit = test::write_synthetic_fit(folder, 1);
+  const ReportData data = gather_report_data(folder);
+  const VectorXd deviation = ligament_deviation(*data.model, fit);
+
+  // The map is linear in the strengths, so differences of whole maps are exact up to round-off.
+  const auto map_with = [&](const std::string& address, double value) {
+    Scene scene = data.model->scene();
+    set_parameter(scene, address, value);
+    return data.model->ligament_map(scene);
+  };
+  std::vector<VectorXd> moved;
+  for (const size_t k : {1u, 2u}) {
+    const auto& p = fit.parameters[k];
+    const double step = p.value * p.sigma;  // log: σ is relative
+    moved.push_back(0.5 * (map_with(p.address, p.value + step) - map_with(p.address, p.value - step)));
+  }
+  const VectorXd variance = moved[0].cwiseAbs2() + moved[1].cwiseAbs2() +
+                            2 * fit.correlation(1, 2) * moved[0].cwiseProduct(moved[1]);
+  ASSERT_EQ(deviation.size(), variance.size());
+  EXPECT_LT((deviation - variance.cwiseSqrt()).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_GT(deviation.maxCoeff(), 1.2 * deviation.minCoeff());
+
+  // An undetermined source makes its surroundings unknown, and nothing else of the fit matters.
+  fit.parameters[1].determined = false;
+  EXPECT_TRUE(ligament_deviation(*data.model, fit).hasNaN());
+  fit.parameters = {fit.parameters[0]};
+  fit.correlation = MatrixXd::Identity(1, 1);
+  EXPECT_EQ(ligament_deviation(*data.model, fit).size(), 0);
+}
+
+}  // namespace
+}  // namespace rhytid::tools

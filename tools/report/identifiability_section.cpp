@@ -1,0 +1,150 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "sim/output/colour_map.h"
+#include "sim/output/plot.h"
+#include "sim/output/text.h"
+#include "tools/report/sections.h"
+#include "tools/report/wording.h"
+
+namespace rhytid::tools {
+namespace {
+
+using fitting::FitResult;
+using fitting::FittedParameter;
+
+void add_singular_values(HtmlPage& page, const FitResult& fit) {
+  // Bars need a base, and 1 is the natural one (a direction known to one standard deviation), but values
+  // spread over decades: show log10.
+  BarChart chart;
+  chart.width = 460;
+  chart.height = 280;
+  chart.series = {""};
+  chart.y.label = "log10 of the singular value";
+  std::string alt = "Singular values: ";
+  for (Eigen::Index i = 0; i < fit.singular_values.size(); ++i) {
+    const double s = fit.singular_values[i];
+    chart.groups.push_back({std::to_string(i + 1), {s > 0 ? std::log10(s) : std::nan("")}, {}});
+    alt += (i ? ", " : "") + short_text(s, 3);
+  }
+  page.svg_figure(
+      svg(chart), alt + ".",
+      "Singular values of the whitened Jacobian by the transformed parameters, largest first. One over "
+      "a value is the standard deviation along its combination: a bar below 0 belongs to a combination "
+      "that the data hold no better than to ±1, for logarithms a factor of e.");
+}
+
+void add_correlations(HtmlPage& page, const FitResult& fit) {
+  HtmlTable table;
+  table.caption = "Correlation of the fitted (transformed) parameters. Near ±1, two parameters trade off.";
+  table.header = {"parameter"};
+  table.wide = true;
+  for (size_t k = 0; k < fit.parameters.size(); ++k) table.header.push_back(std::to_string(k + 1));
+  for (size_t i = 0; i < fit.parameters.size(); ++i) {
+    std::vector<TableCell> row = {std::to_string(i + 1) + " " + fit.parameters[i].name};
+    for (size_t j = 0; j < fit.parameters.size(); ++j) {
+      const double c = fit.correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      if (std::isnan(c)) {
+        row.emplace_back("–");
+      } else {
+        row.emplace_back(fixed_text(c, 2), map_colour(ColourMap::diverging, 0.5 + 0.5 * c));
+      }
+    }
+    table.rows.push_back(std::move(row));
+  }
+  page.table(table);
+}
+
+std::string strongest_pair(const FitResult& fit) {
+  double strongest = 0;
+  Eigen::Index a = 0, b = 0;
+  for (Eigen::Index i = 0; i < fit.correlation.rows(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      if (std::abs(fit.correlation(i, j)) > std::abs(strongest))
+        strongest = fit.correlation(i, j), a = j, b = i;
+    }
+  }
+  if (std::abs(strongest) < 0.8) return "No two parameters trade off strongly: no correlation reaches ±0.8.";
+  const std::string first = fit.parameters[static_cast<size_t>(a)].name;
+  const std::string second = fit.parameters[static_cast<size_t>(b)].name;
+  return first + " and " + second + " trade off (correlation " + fixed_text(strongest, 2) +
+         "): the footage holds " + (strongest > 0 ? "their ratio or difference" : "their product or sum") +
+         " better than either of them alone.";
+}
+
+/// What one standard deviation along a combination does to a parameter.
+std::string change_text(const FittedParameter& p, double component, double deviation) {
+  const double step = component * deviation;
+  if (!std::isfinite(step)) return "unbounded";
+  if (p.transform == "log") {
+    return std::abs(step) > 20 ? "unbounded" : "× " + short_text(std::exp(step), 4);
+  }
+  if (p.transform == "logit") {
+    const double odds = (p.value - p.lower) / (p.upper - p.value) * std::exp(step);
+    return short_text(p.value, 4) + " to " + short_text(p.lower + (p.upper - p.lower) * odds / (1 + odds), 4);
+  }
+  return (step < 0 ? "− " : "+ ") + readable_unit(p.value, p.unit).text(std::abs(step), 3);
+}
+
+void add_weakest(HtmlPage& page, const FitResult& fit) {
+  const Eigen::Index last = fit.singular_values.size() - 1;
+  const double smallest = fit.singular_values[last];
+  VectorXd v = fit.right_vectors.col(last);
+  Eigen::Index leader = 0;
+  v.cwiseAbs().maxCoeff(&leader);
+  if (v[leader] < 0) v = -v;  // the sign is free: let the leading parameter rise
+  const double widening = std::sqrt(std::max(1.0, fit.reduced_chi_square));
+  const double deviation = widening / smallest;
+  std::vector<size_t> order(fit.parameters.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return std::abs(v[static_cast<Eigen::Index>(a)]) > std::abs(v[static_cast<Eigen::Index>(b)]);
+  });
+  std::string up, down;
+  HtmlTable table;
+  table.caption = "The combination that the footage holds worst, moved by one standard deviation.";
+  table.header = {"parameter", "component", "change"};
+  for (const size_t k : order) {
+    const double component = v[static_cast<Eigen::Index>(k)];
+    const FittedParameter& p = fit.parameters[k];
+    table.rows.push_back({p.name, fixed_text(component, 3), change_text(p, component, deviation)});
+    if (std::abs(component) < 0.2) continue;
+    std::string& side = component > 0 ? up : down;
+    side += (side.empty() ? "" : " and ") + p.name;
+  }
+  page.heading("The weakest combination");
+  std::string text =
+      "The footage hardly notices when " + up + (up.find(" and ") == std::string::npos ? " rises" : " rise");
+  if (!down.empty())
+    text += " while " + down + (down.find(" and ") == std::string::npos ? " falls" : " fall");
+  text += ". ";
+  text += smallest > 0 ? "One standard deviation along this combination is " + short_text(deviation, 3) +
+                             " in the transformed parameters."
+                       : "Along this combination nothing changes at all: it is not determined.";
+  if (fit.singular_values[0] > 0 && smallest > 0) {
+    text += " The best held combination is known " + short_text(fit.singular_values[0] / smallest, 2) +
+            " times more precisely.";
+  }
+  page.paragraph(text);
+  page.table(table);
+}
+
+}  // namespace
+
+void add_identifiability(HtmlPage& page, const ReportData& data) {
+  const FitResult& fit = data.fit;
+  page.section("identifiability", "What the footage determines");
+  if (fit.singular_values.size() == 0 || fit.parameters.empty()) {
+    page.paragraph("The fit ended before this was worked out.");
+    return;
+  }
+  page.begin_row();
+  add_singular_values(page, fit);
+  if (fit.correlation.size() > 0) add_correlations(page, fit);
+  page.end_row();
+  if (fit.correlation.rows() > 1) page.paragraph(strongest_pair(fit));
+  if (fit.right_vectors.size() > 0 && fit.parameters.size() > 1) add_weakest(page, fit);
+}
+
+}  // namespace rhytid::tools

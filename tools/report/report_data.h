@@ -1,0 +1,44 @@
+// Everything a report is made from: the record of the fit and, as far as the files are still there, scene,
+// camera and footage.
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fitting/cameras.h"
+#include "fitting/case.h"
+#include "fitting/fit_result.h"
+#include "sim/output/image.h"
+#include "sim/scene/scene_model.h"
+
+namespace rhytid::tools {
+
+struct ReportData {
+  std::string folder;
+  fitting::FitResult fit;
+  std::optional<fitting::Case> fit_case;    ///< when it can still be read
+  std::string scene_file;                   ///< that was read; empty when none could be
+  std::unique_ptr<const SceneModel> model;  ///< of the scene at the fitted values, or null
+  std::optional<fitting::Camera> camera;
+  std::string footage;                ///< that exists; empty when none does
+  std::vector<std::string> left_out;  ///< sentences: what the report lacks and why
+
+  /// Frames with residuals: the last one that has at least half as many as the fullest; −1 without residuals.
+  int late_frame() const;
+};
+
+/// Reads fit.json and residuals.csv of `folder` (throws InputError without them) and what they name. Files
+/// are looked for as written, then beside the case file, then in `folder`. The scene at the fitted values is
+/// fitted_scene.json in `folder` when the fit left one, else the scene of the fit with the values put in.
+ReportData gather_report_data(const std::string& folder);
+
+/// A frame of the footage, BGR; nothing when the footage cannot be read that far.
+std::optional<cv::Mat> footage_frame(const std::string& footage, int frame);
+
+/// JPEG of a BGR picture, for photographs; PNG is for drawings.
+std::string encode_jpeg(const cv::Mat& bgr);
+
+}  // namespace rhytid::tools

@@ -1,0 +1,120 @@
+#include "sim/core/build_info.h"
+#include "sim/output/text.h"
+#include "sim/scene/names.h"
+#include "sim/solve/blas_info.h"
+#include "tools/report/sections.h"
+#include "tools/report/wording.h"
+
+namespace rhytid::tools {
+namespace {
+
+using Facts = std::vector<std::pair<std::string, std::string>>;
+
+/// For a shell: quoted unless every character is harmless.
+std::string shell_word(const std::string& word) {
+  const bool plain = !word.empty() && word.find_first_not_of(
+                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                          "0123456789_-./,:+=@%") == std::string::npos;
+  if (plain) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+std::string layer_text(const LayerScene& layer, const SkinScene& skin) {
+  std::string text = layer.name + " " + short_text(layer.thickness) + " mm";
+  if (skin.scheme == ThicknessScheme::stacked) {
+    text += " (" + counted(layer.elements, "element") + " of order " + std::to_string(layer.order) + ")";
+  }
+  return text;
+}
+
+Facts scheme_facts(const SceneModel& model) {
+  const Scene& scene = model.scene();
+  const SkinMesh& mesh = model.model().mesh;
+  std::string layers;
+  for (const LayerScene& layer : scene.skin.layers) {
+    layers += (layers.empty() ? "" : ", ") + layer_text(layer, scene.skin);
+  }
+  return {{"Scene", scene.name + (scene.description.empty() ? "" : ": " + scene.description)},
+          {"Elements", counted(mesh.num_elements(), "prism") + " of order " + std::to_string(mesh.order) +
+                           " in the plane, " + counted(3L * mesh.num_nodes(), "displacement component")},
+          {"Thickness", to_string(scene.skin.scheme) + ": " + layers},
+          {"Time", counted(scene.time.frames, "frame") + " at " + short_text(scene.time.frame_rate) +
+                       " Hz, " + counted(scene.time.substeps, "substep") + " a frame"},
+          {"Damper", to_string(scene.time.damper)},
+          {"Minimiser", scene.solver.minimiser + ", relative tolerance " +
+                            short_text(scene.solver.relative_tolerance) + " plus " +
+                            short_text(scene.solver.absolute_tolerance) + " N"}};
+}
+
+Facts count_facts(const ReportData& data) {
+  const fitting::FitResult& fit = data.fit;
+  Facts facts = {
+      {"Optimiser", fit.optimiser + ", " + fit.status},
+      {"Forward runs",
+       std::to_string(fit.forward_runs) + ", median " + short_text(fit.forward_seconds, 3) + " s"},
+      {"Jacobians", std::to_string(fit.jacobian_runs)},
+      {"Whole fit", duration_text(fit.seconds)},
+      {"Observations", std::to_string(fit.num_observations) + " of " + counted(fit.num_tracks, "track") +
+                           " over " + counted(fit.frames, "frame")},
+      {"Tracks left out", std::to_string(fit.tracks_left_out)}};
+  if (data.fit_case)
+    facts.emplace_back("Seed of rendered footage", std::to_string(data.fit_case->render.seed));
+  return facts;
+}
+
+Facts build_facts() {
+  const BuildInfo build = build_info();
+  const BlasInfo blas = blas_info();
+  return {{"Version", "Rhytid " + build.version + ", " + build.build_type +
+                          (build.sanitizers.empty() ? "" : ", sanitizers " + build.sanitizers)},
+          {"Compiler", build.compiler},
+          {"BLAS", blas.name + (blas.config.empty() ? "" : " (" + blas.config + ")")}};
+}
+
+Facts file_facts(const ReportData& data) {
+  Facts facts;
+  const auto add = [&facts](const char* what, const std::string& path) {
+    if (!path.empty()) facts.emplace_back(what, path);
+  };
+  add("Case", data.fit.case_file);
+  add("Scene of the fit", data.fit.scene_file);
+  if (data.scene_file != data.fit.scene_file) add("Scene in the pictures", data.scene_file);
+  add("Footage", data.fit.footage_file);
+  add("Tracks", data.fit.tracks_file);
+  add("Camera", data.fit.camera_file);
+  add("Results", data.folder);
+  return facts;
+}
+
+}  // namespace
+
+void add_run_facts(HtmlPage& page, const ReportData& data) {
+  page.section("run", "How this was made");
+  page.facts(count_facts(data));
+  if (data.model) {
+    page.heading("Schemes");
+    page.facts(scheme_facts(*data.model));
+  }
+  if (!data.fit.notes.empty()) {
+    page.heading("Notes of the fit");
+    page.list(data.fit.notes);
+  }
+  page.heading("Program");
+  page.facts(build_facts());
+  page.heading("Files");
+  page.facts(file_facts(data));
+  page.heading("To do it again");
+  std::string commands;
+  if (!data.fit.case_file.empty()) {
+    commands = "rhytid fit " + shell_word(data.fit.case_file) + " -o " + shell_word(data.folder) + "\n";
+  }
+  page.code(commands + "rhytid report " + shell_word(data.folder));
+  if (!data.left_out.empty()) {
+    page.heading("Left out of this report");
+    page.list(data.left_out);
+  }
+}
+
+}  // namespace rhytid::tools
