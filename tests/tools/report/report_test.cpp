@@ -74,7 +74,7 @@ TEST(Report, HoldsTheWholeFit) {
     EXPECT_THAT(html, HasSubstr("<strong>" + short_text(p.value, 7) + "</strong>"));
   EXPECT_THAT(html, HasSubstr("left strength and right strength trade off (correlation -0.86)"));
   EXPECT_THAT(html, HasSubstr("hardly notices when left strength rises"));
-  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">22</th>"));  // the track that slipped is the worst
+  EXPECT_THAT(html, HasSubstr("<th scope=\"row\" class=\"t\">22</th>"));  // the track that slipped is the worst
   EXPECT_THAT(html, HasSubstr("rhytid report " + folder));
   EXPECT_THAT(html, HasSubstr("exponential"));
 
