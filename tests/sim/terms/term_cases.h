@@ -58,16 +58,9 @@ inline VectorXd smooth_displacement(const SkinMesh& mesh, Rng& rng, double amoun
 inline TermCase skin_case(const KernelTable& kernels, bool viscous, DamperScheme scheme, int order,
                           int thickness_order, double amount = 0.2) {
   Rng rng(21);
-  TermCase c{viscous ? "skin" : "elastic skin",
-             curved_patch(order, thickness_order, rng),
-             {},
-             {},
-             {},
-             {},
-             {},
-             {},
-             {},
-             {}};
+  TermCase c;
+  c.name = viscous ? "skin" : "elastic skin";
+  c.mesh = curved_patch(order, thickness_order, rng);
   c.terms.push_back(viscous ? Term("skin", kernels, SkinLaw{scheme})
                             : Term("elastic", kernels, ElasticSkinLaw{}));
   for (int layer = 0; layer < 2; ++layer) {
@@ -93,7 +86,10 @@ inline TermCase skin_case(const KernelTable& kernels, bool viscous, DamperScheme
 inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice, int order,
                              Mollifier mollifier = Mollifier::quintic) {
   Rng rng(22);
-  TermCase c{kind + " " + choice.name, curved_patch(order, 2, rng), {}, choice.shape, {}, {}, {}, {}, {}, {}};
+  TermCase c;
+  c.name = kind + " " + choice.name;
+  c.mesh = curved_patch(order, 2, rng);
+  c.shape = choice.shape;
   const bool inner = kind == "ligaments";
   TermGroup g = surface_group(c.mesh, inner ? SkinSide::inner : SkinSide::outer, triangle_rule(10));
   c.u_old = smooth_displacement(c.mesh, rng, 0.05);

@@ -152,6 +152,9 @@ TEST(TermKernels, AdjointBlocksAreTransposesOfTangentBlocks) {
       if (size > 0) worst = std::max(worst, std::fabs(force_part + history_part - backward) / size);
     }
     EXPECT_GT(native_bar.norm(), 0);
+    if (nh > 0) {
+      EXPECT_GT(ds_new.col(3).norm(), 0) << "no parameter reaches the history: dt = 0?";
+    }
     if (c.term().kernels().np > 0) {
       EXPECT_GT(u_old_bar.norm() + s_old_bar.norm(), 0);
     }
