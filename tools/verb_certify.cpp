@@ -26,7 +26,7 @@ class Certify : public Verb {
         "its own as well.",
         "scene.json and what it names",
         "certificate.txt, certificate.json; prints the same text",
-        "rhytid certify data/scenes/drag/scene.json -o run/certificate --thorough"};
+        "rhytid certify data/scenes/bent_patch/scene.json -o run/certificate --thorough"};
   }
   void add_options(CLI::App& app) override {
     app.add_option("--parameters", addresses_,
