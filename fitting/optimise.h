@@ -14,8 +14,8 @@ namespace rhytid::fitting {
 struct OptimiserOptions {
   int max_evaluations = 30;  ///< forward runs
   /// Converged when a step lowers F by less than this part of it. At F of some thousands (one half per
-  /// observed number) 1e-8 is far below the statistical scale of ½.
-  double relative_decrease = 1e-8;
+  /// observed number) 1e-6 is far below the statistical scale of ½; less only buys runs that change nothing.
+  double relative_decrease = 1e-6;
   double step_tolerance = 1e-7;  ///< on t, relative to |t|
 };
 
