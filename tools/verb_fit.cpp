@@ -10,6 +10,7 @@
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "tools/report/write_report.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -35,7 +36,7 @@ class Fit : public Verb {
         "section 'fit' of the case.",
         "case.json, its scene; tracks.csv and camera.yaml from the case or the -o folder; truth.json of the "
         "-o folder if there is one",
-        "fit.json, residuals.csv, answer.txt, and the table of answer.txt on stdout",
+        "fit.json, residuals.csv, answer.txt, report.html, and the table of answer.txt on stdout",
         "rhytid fit data/cases/twin/case.json -o run/twin"};
   }
   void add_options(CLI::App& app) override {
@@ -74,8 +75,12 @@ class Fit : public Verb {
     const std::string answer = fitting::answer_text(result);
     write_file((fs::path(folder) / "answer.txt").string(), answer);
     context.progress.finish();
-    context.out << answer << (fs::path(folder) / "fit.json").string() << '\n';
+    context.out << answer << (fs::path(folder) / "fit.json").string() << std::endl;
     if (context.progress.interrupted()) return ExitCode::interrupted;
+    const ReportOutcome report = write_report(folder, context.progress);
+    for (const std::string& sentence : report.left_out) context.progress.warning(sentence);
+    context.progress.finish();
+    context.out << report.path << '\n';
     return result.converged ? ExitCode::ok : ExitCode::not_converged;
   }
 

@@ -15,7 +15,7 @@ using fitting::FittedParameter;
 
 std::string percent_off(double value, double truth) {
   const double percent = 100 * (value / truth - 1);
-  return (percent >= 0 ? "+" : "−") + short_text(std::abs(percent), 2) + " %";
+  return (percent >= 0 ? "+" : "−") + short_text(std::abs(percent), 2) + "\u00a0%";
 }
 
 std::string truth_sentence(double value, double low, double high, const std::string& unit,
@@ -73,10 +73,8 @@ PlotInterval interval(const std::string& name, double value, double low, double 
   PlotInterval row{name, value / reference, low / reference, high / reference, {}, {}};
   if (reference < 0) std::swap(row.low, row.high);
   const double half = 0.5 * std::abs(row.high - row.low);
-  row.note =
-      determined && std::isfinite(half)
-          ? short_text(row.value, digits_for(row.value, row.low, row.high)) + " ± " + short_text(half, 2)
-          : "not determined";
+  // Numbers are in the table; here only what has no interval to draw.
+  if (!determined || !std::isfinite(half)) row.note = "not determined";
   return row;
 }
 
@@ -120,7 +118,7 @@ void add_forest(HtmlPage& page, const FitResult& fit) {
     plot.axis.minimum = *low - room * (*high - *low);
     plot.axis.maximum = *high + room * (*high - *low);
   }
-  plot.width = 620;
+  plot.width = 460;
   page.svg_figure(
       svg(plot),
       "Fitted values with 95 percent intervals, each divided by its truth or initial value; "

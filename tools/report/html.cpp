@@ -34,9 +34,9 @@ margin:0 0 12px}
 .good{color:var(--good)}.doubtful{color:var(--doubtful)}.bad{color:var(--bad)}
 .scroll{overflow-x:auto;margin:0 0 14px}
 table{border-collapse:collapse;font-size:.92rem;font-variant-numeric:tabular-nums;min-width:min(100%,420px)}
-caption{text-align:left;color:var(--soft);padding:0 0 6px;font-size:.9rem}
+.caption{color:var(--soft);margin:0 0 4px;font-size:.9rem}
 th,td{padding:6px 12px 6px 0;border-bottom:1px solid var(--line);text-align:right;vertical-align:top}
-th{font-weight:600;vertical-align:bottom}
+th{font-weight:600}thead th{vertical-align:bottom}
 .t{text-align:left}.wide td,.wide th{white-space:nowrap}
 td.c{padding:6px 8px;text-align:center;border:1px solid var(--card)}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:4px 18px;margin:0 0 12px;font-size:.95rem}
@@ -46,7 +46,7 @@ font:.86rem/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;margin:0 0 
 figure{margin:0 0 16px;min-width:0}
 figcaption{color:var(--soft);font-size:.9rem;margin-top:6px;max-width:75ch}
 figure img,figure svg{display:block;width:100%;height:auto;border-radius:6px;background:#fff}
-figure svg{max-width:760px}
+figure svg{max-width:640px}
 .row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:6px 22px;align-items:start}
 @media(max-width:560px){main,header,nav{padding:0 12px}header{padding-top:20px}section{padding:16px 14px}
 h1{font-size:1.4rem}dl{grid-template-columns:1fr;gap:0}dd{margin-bottom:8px}th,td{padding-right:9px}}
@@ -118,9 +118,11 @@ void HtmlPage::facts(const std::vector<std::pair<std::string, std::string>>& fac
 }
 
 void HtmlPage::table(const HtmlTable& table) {
-  body_ += "<div class=\"scroll\"><table";
+  const std::string id = "table-" + std::to_string(++num_tables_);
+  body_ += "<p class=\"caption\" id=\"" + id + "\">" + xml_escaped(table.caption) + "</p>\n";
+  body_ += "<div class=\"scroll\"><table aria-labelledby=\"" + id + "\"";
   if (table.wide) body_ += " class=\"wide\"";
-  body_ += ">\n<caption>" + xml_escaped(table.caption) + "</caption>\n<thead><tr>";
+  body_ += ">\n<thead><tr>";
   for (size_t i = 0; i < table.header.size(); ++i) {
     const bool text = static_cast<int>(i) < table.text_columns;
     body_ += std::string("<th scope=\"col\"") + (text ? " class=\"t\">" : ">") +

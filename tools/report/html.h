@@ -65,6 +65,7 @@ class HtmlPage {
  private:
   std::string body_, navigation_, title_, subtitle_;
   bool in_section_ = false;
+  int num_tables_ = 0;
 };
 
 }  // namespace rhytid::tools

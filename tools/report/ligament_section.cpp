@@ -82,6 +82,7 @@ Image draw_map(const ReportData& data, const VectorXd& per_column, const std::st
 void add_strengths(HtmlPage& page, const ReportData& data) {
   const Scene& scene = data.model->scene();
   HtmlTable table;
+  table.wide = true;
   table.caption = "The sources of the map. Strength b in 1/mm; positions on the inner surface in mm.";
   table.header = {"source", "strength b", "95 % interval", "x", "y", "z", "radius"};
   for (size_t s = 0; s < scene.ligaments->sources.size(); ++s) {
@@ -175,7 +176,7 @@ void add_ligaments(HtmlPage& page, const ReportData& data) {
       "Ligament parameter b at the fitted values (" + range_text(b) +
           "). Rings: sources with their strength.");
   if (deviation.size() > 0) {
-    add(deviation, "σ of b [1/mm]", false,
+    add(deviation, "std b [1/mm]", false,
         "Map of the standard deviation of b, " + range_text(deviation) + ".",
         "Standard deviation of b (" + range_text(deviation) +
             "), propagated linearly from the fitted parameters with their correlations." +

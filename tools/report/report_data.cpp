@@ -5,6 +5,7 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
+#include "fitting/parametrisation.h"
 #include "fitting/tracking/frame_source.h"
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
@@ -28,11 +29,6 @@ std::string found_file(const std::string& named, const ReportData& data) {
 }
 
 Scene scene_of_fit(ReportData& data) {
-  const std::string stored = (fs::path(data.folder) / "fitted_scene.json").string();
-  if (fs::exists(stored)) {
-    data.scene_file = stored;
-    return load_scene(stored);
-  }
   data.scene_file = found_file(data.fit.scene_file, data);
   if (data.scene_file.empty()) {
     throw InputError(data.fit.scene_file.empty() ? "the fit names no scene file"
@@ -53,11 +49,36 @@ void load_case(ReportData& data) {
   }
 }
 
+/// The values put in as the fit did: with a case, contact penalties follow the modulus of the gauge layer.
+Scene with_fitted_values(Scene scene, const ReportData& data) {
+  const auto& parameters = data.fit.parameters;
+  if (!data.fit_case || parameters.empty()) {
+    for (const fitting::FittedParameter& p : parameters) set_parameter(scene, p.address, p.value);
+    return scene;
+  }
+  fitting::FitCase fit = data.fit_case->fit;
+  fit.parameters.clear();
+  for (const fitting::FittedParameter& p : parameters) {
+    fitting::FitParameter parameter;
+    parameter.address = p.address;
+    parameter.initial = p.initial, parameter.lower = p.lower, parameter.upper = p.upper;
+    parameter.transform = p.transform == "log"     ? ParameterTransform::log
+                          : p.transform == "logit" ? ParameterTransform::logit
+                                                   : ParameterTransform::none;
+    fit.parameters.push_back(parameter);
+  }
+  const fitting::Parametrisation parametrisation(scene, fit);
+  VectorXd t(parametrisation.size());
+  for (Eigen::Index k = 0; k < t.size(); ++k) {
+    const auto i = static_cast<size_t>(k);
+    t[k] = parametrisation.variables()[i].to_transformed(parameters[i].value);
+  }
+  return parametrisation.scene(t.cwiseMax(parametrisation.lower()).cwiseMin(parametrisation.upper()));
+}
+
 void load_model(ReportData& data) {
   try {
-    Scene scene = scene_of_fit(data);
-    for (const fitting::FittedParameter& p : data.fit.parameters) set_parameter(scene, p.address, p.value);
-    data.model = std::make_unique<const SceneModel>(std::move(scene));
+    data.model = std::make_unique<const SceneModel>(with_fitted_values(scene_of_fit(data), data));
   } catch (const InputError& e) {
     data.left_out.push_back(std::string("No picture of the skin: ") + e.what());
   }

@@ -31,8 +31,8 @@ struct ReportData {
 };
 
 /// Reads fit.json and residuals.csv of `folder` (throws InputError without them) and what they name. Files
-/// are looked for as written, then beside the case file, then in `folder`. The scene at the fitted values is
-/// fitted_scene.json in `folder` when the fit left one, else the scene of the fit with the values put in.
+/// are looked for as written, then beside the case file, then in `folder`. The scene is that of
+/// the fit, with the settings of the case, at the fitted values.
 ReportData gather_report_data(const std::string& folder);
 
 /// A frame of the footage, BGR; nothing when the footage cannot be read that far.

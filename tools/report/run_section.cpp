@@ -108,9 +108,16 @@ void add_run_facts(HtmlPage& page, const ReportData& data) {
   page.heading("To do it again");
   std::string commands;
   if (!data.fit.case_file.empty()) {
-    commands = "rhytid fit " + shell_word(data.fit.case_file) + " -o " + shell_word(data.folder) + "\n";
+    commands = "rhytid fit " + shell_word(data.fit.case_file) + " -o " + shell_word(data.folder);
+    if (!data.fit.optimiser.empty())
+      commands += " --optimiser " + data.fit.optimiser.substr(0, data.fit.optimiser.find(' '));
+    std::string addresses;
+    for (const auto& p : data.fit.parameters) addresses += (addresses.empty() ? "" : ",") + p.address;
+    if (!addresses.empty()) commands += " --parameters " + shell_word(addresses);
+    commands += "\n";
   }
   page.code(commands + "rhytid report " + shell_word(data.folder));
+  if (!commands.empty()) page.note("Settings given to that run by --set or --max-evaluations come on top.");
   if (!data.left_out.empty()) {
     page.heading("Left out of this report");
     page.list(data.left_out);

@@ -20,7 +20,7 @@ std::string estimate(double value, double low, double high, const std::string& u
   if (!determined || !std::isfinite(low) || !std::isfinite(high)) {
     return "not determined by this footage (the fit ended at " + readable.text(value, 3) + ")";
   }
-  return readable.text(value, digits) + " (95 % interval " + readable.number(low, digits) + " to " +
+  return readable.text(value, digits) + " (95\u00a0% interval " + readable.number(low, digits) + " to " +
          readable.text(high, digits) + ")";
 }
 

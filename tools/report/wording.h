@@ -24,7 +24,8 @@ ReadableUnit readable_unit(double value, const std::string& internal_unit);
 /// Digits of `value` down to the second digit of half the interval's width; between 3 and 8.
 int digits_for(double value, double low, double high);
 
-/// "12.1 kPa (95 % interval 11.7 to 12.5 kPa)", or that the footage does not determine it.
+/// "12.1 kPa (95 % interval 11.7 to 12.5 kPa)" with a no-break space before %, or that the footage does not
+/// determine it.
 std::string estimate_text(const fitting::FittedParameter& p);
 std::string estimate_text(const fitting::DerivedQuantity& d);
 

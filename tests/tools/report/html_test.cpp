@@ -82,9 +82,9 @@ TEST(Wording, DigitsFollowTheInterval) {
   fitting::FittedParameter p;
   p.unit = "MPa";
   p.value = 1.0234, p.low95 = 0.9934, p.high95 = 1.0534;
-  EXPECT_EQ(estimate_text(p), "1.023 MPa (95 % interval 0.9934 to 1.053 MPa)");
+  EXPECT_EQ(estimate_text(p), "1.023 MPa (95\u00a0% interval 0.9934 to 1.053 MPa)");
   p.value = 0.0204, p.low95 = 0.0194, p.high95 = 0.0214;
-  EXPECT_EQ(estimate_text(p), "20.4 kPa (95 % interval 19.4 to 21.4 kPa)");
+  EXPECT_EQ(estimate_text(p), "20.4 kPa (95\u00a0% interval 19.4 to 21.4 kPa)");
   p.determined = false;
   EXPECT_THAT(estimate_text(p), HasSubstr("not determined"));
   p.determined = true, p.high95 = INFINITY;

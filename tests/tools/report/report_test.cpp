@@ -65,8 +65,8 @@ TEST(Report, HoldsTheWholeFit) {
   EXPECT_THAT(html, HasSubstr("Fit of drag &lt;twin&gt; &amp; &quot;marks&quot;"));
   EXPECT_THAT(
       html,
-      HasSubstr("film youngs_modulus: 1.013 MPa (95 % interval 0.9741 to 1.053 MPa). The truth is 1 MPa "
-                "(the estimate is off by +1.3 %): inside the interval."));
+      HasSubstr("film youngs_modulus: 1.013 MPa (95\u00a0% interval 0.9741 to 1.053 MPa). The truth is 1 MPa "
+                "(the estimate is off by +1.3\u00a0%): inside the interval."));
   EXPECT_THAT(html, HasSubstr("outside the interval"));  // right strength
   EXPECT_THAT(html, HasSubstr(xml_escaped(fit.gauge)));
   EXPECT_THAT(html, HasSubstr("too short &lt;for it&gt;"));
@@ -74,7 +74,8 @@ TEST(Report, HoldsTheWholeFit) {
     EXPECT_THAT(html, HasSubstr("<strong>" + short_text(p.value, 7) + "</strong>"));
   EXPECT_THAT(html, HasSubstr("left strength and right strength trade off (correlation -0.86)"));
   EXPECT_THAT(html, HasSubstr("hardly notices when left strength rises"));
-  EXPECT_THAT(html, HasSubstr("<th scope=\"row\" class=\"t\">22</th>"));  // the track that slipped is the worst
+  EXPECT_THAT(html,
+              HasSubstr("<th scope=\"row\" class=\"t\">22</th>"));  // the track that slipped is the worst
   EXPECT_THAT(html, HasSubstr("rhytid report " + folder));
   EXPECT_THAT(html, HasSubstr("exponential"));
 
