@@ -15,15 +15,18 @@ using fitting::FittedParameter;
 
 std::string percent_off(double value, double truth) {
   const double percent = 100 * (value / truth - 1);
-  return (percent >= 0 ? "+" : "−") + short_text(std::abs(percent), 2) + "\u00a0%";
+  if (percent > 300) return "a factor of " + short_text(value / truth, 2);
+  const double size = std::abs(percent);
+  return (percent >= 0 ? "+" : "−") + (size < 10 ? short_text(size, 2) : fixed_text(size, 0)) + "\u00a0%";
 }
 
 std::string truth_sentence(double value, double low, double high, const std::string& unit,
-                           const std::optional<double>& truth) {
-  const auto inside = truth_inside(truth, low, high);
+                           const std::optional<double>& truth, bool determined) {
+  // An interval that spans all that was allowed holds the truth without saying anything.
+  const auto inside = determined ? truth_inside(truth, low, high) : std::nullopt;
   if (!truth || std::isnan(*truth)) return {};
   std::string text = " The truth is " + readable_unit(value, unit).text(*truth, digits_for(value, low, high));
-  if (*truth != 0) text += " (the estimate is off by " + percent_off(value, *truth) + ")";
+  if (determined && *truth != 0) text += " (the estimate is off by " + percent_off(value, *truth) + ")";
   if (!inside) return text + ".";
   return text + (*inside ? ": inside the interval." : ": outside the interval.");
 }
@@ -33,11 +36,12 @@ std::vector<std::string> estimates(const FitResult& fit) {
   for (const FittedParameter& p : fit.parameters) {
     std::string line = p.name + ": " + estimate_text(p) + ".";
     if (p.at_bound) line += " It ended at the edge of its allowed range, so the range decides it.";
-    lines.push_back(line + truth_sentence(p.value, p.low95, p.high95, p.unit, p.truth));
+    lines.push_back(line + truth_sentence(p.value, p.low95, p.high95, p.unit, p.truth, p.determined));
   }
   for (const DerivedQuantity& d : fit.derived) {
-    lines.push_back(d.name + ": " + estimate_text(d) + "." +
-                    truth_sentence(d.value, d.low95, d.high95, d.unit, d.truth));
+    lines.push_back(
+        d.name + ": " + estimate_text(d) + "." +
+        truth_sentence(d.value, d.low95, d.high95, d.unit, d.truth, std::isfinite(d.high95 - d.low95)));
   }
   return lines;
 }
@@ -140,9 +144,9 @@ void add_table(HtmlPage& page, const FitResult& fit) {
   table.text_columns = 3;
   table.wide = true;
   const auto number = [](double x) { return std::isnan(x) ? std::string("–") : short_text(x, 7); };
-  const auto inside = [](const auto& q) -> std::string {
+  const auto inside = [](const auto& q, bool determined) -> std::string {
     const auto known = truth_inside(q.truth, q.low95, q.high95);
-    return !known ? "–" : *known ? "yes" : "no";
+    return !known || !determined ? "–" : *known ? "yes" : "no";
   };
   for (const FittedParameter& p : fit.parameters) {
     TableCell value(number(p.value));
@@ -150,13 +154,13 @@ void add_table(HtmlPage& page, const FitResult& fit) {
     table.rows.push_back({p.name, p.unit, p.transform, number(p.initial), value, number(p.low95),
                           number(p.high95), std::isnan(p.sigma) ? "–" : short_text(p.sigma, 3),
                           short_text(p.lower, 4) + " to " + short_text(p.upper, 4),
-                          p.truth ? number(*p.truth) : "–", inside(p)});
+                          p.truth ? number(*p.truth) : "–", inside(p, p.determined)});
   }
   for (const DerivedQuantity& d : fit.derived) {
     TableCell value(number(d.value));
     value.strong = true;
     table.rows.push_back({d.name, d.unit, "derived", "–", value, number(d.low95), number(d.high95), "–", "–",
-                          d.truth ? number(*d.truth) : "–", inside(d)});
+                          d.truth ? number(*d.truth) : "–", inside(d, std::isfinite(d.high95 - d.low95))});
   }
   page.table(table);
 }

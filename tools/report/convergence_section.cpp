@@ -11,6 +11,9 @@ namespace {
 using fitting::FitIteration;
 using fitting::FittedParameter;
 
+/// An optimiser records a trial whose run failed with a cost near the largest number there is.
+constexpr double failed_cost = 1e100;
+
 LinePlot plot_over_iterations(const std::string& y_label) {
   LinePlot plot;
   plot.width = 460;
@@ -52,7 +55,8 @@ void add_convergence(HtmlPage& page, const ReportData& data) {
                  counted(data.fit.forward_runs, "forward run") + ".");
   LinePlot cost = plot_over_iterations("cost, gradient norm");
   cost.y.logarithmic = true;
-  cost.series.push_back(series_of(history, "cost", [](const FitIteration& i) { return i.cost; }));
+  cost.series.push_back(series_of(
+      history, "cost", [](const FitIteration& i) { return i.cost < failed_cost ? i.cost : std::nan(""); }));
   PlotSeries gradient =
       series_of(history, "gradient norm", [](const FitIteration& i) { return i.gradient_norm; });
   gradient.dashed = true;
@@ -73,9 +77,9 @@ void add_convergence(HtmlPage& page, const ReportData& data) {
   // A legend of many names needs room of its own.
   values.height += 14 * static_cast<int>(std::max<size_t>(4, data.fit.parameters.size()) - 4);
   page.begin_row();
-  page.svg_figure(
-      svg(cost), "Cost and gradient norm over the iterations, logarithmic.",
-      "Cost ½|z|² of the whitened residuals and the norm of its gradient, on a logarithmic scale.");
+  page.svg_figure(svg(cost), "Cost and gradient norm over the iterations, logarithmic.",
+                  "Cost ½|z|² of the whitened residuals and the norm of its gradient, on a logarithmic "
+                  "scale. A gap is a trial whose run failed.");
   page.svg_figure(svg(values), "Each parameter between its bounds over the iterations.",
                   "Each parameter between its lower (0) and upper (1) bound, logarithmic for those fitted as "
                   "logarithms.");

@@ -119,7 +119,7 @@ void HtmlPage::facts(const std::vector<std::pair<std::string, std::string>>& fac
 
 void HtmlPage::table(const HtmlTable& table) {
   const std::string id = "table-" + std::to_string(++num_tables_);
-  body_ += "<p class=\"caption\" id=\"" + id + "\">" + xml_escaped(table.caption) + "</p>\n";
+  body_ += "<div><p class=\"caption\" id=\"" + id + "\">" + xml_escaped(table.caption) + "</p>\n";
   body_ += "<div class=\"scroll\"><table aria-labelledby=\"" + id + "\"";
   if (table.wide) body_ += " class=\"wide\"";
   body_ += ">\n<thead><tr>";
@@ -149,7 +149,7 @@ void HtmlPage::table(const HtmlTable& table) {
     }
     body_ += "</tr>\n";
   }
-  body_ += "</tbody></table></div>\n";
+  body_ += "</tbody></table></div></div>\n";
 }
 
 void HtmlPage::code(const std::string& text) {

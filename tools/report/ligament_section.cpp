@@ -175,7 +175,8 @@ void add_ligaments(HtmlPage& page, const ReportData& data) {
   add(b, "b [1/mm]", true, "Heat map of the ligament parameter b over the patch, from " + range_text(b) + ".",
       "Ligament parameter b at the fitted values (" + range_text(b) +
           "). Rings: sources with their strength.");
-  if (deviation.size() > 0) {
+  const bool known_somewhere = deviation.size() > 0 && !deviation.array().isNaN().all();
+  if (known_somewhere) {
     add(deviation, "std b [1/mm]", false,
         "Map of the standard deviation of b, " + range_text(deviation) + ".",
         "Standard deviation of b (" + range_text(deviation) +
@@ -183,7 +184,14 @@ void add_ligaments(HtmlPage& page, const ReportData& data) {
             (deviation.hasNaN() ? " Grey: a parameter acts there that the footage does not determine." : ""));
   }
   page.end_row();
-  if (deviation.size() == 0) page.note("Nothing that was fitted changes b, so the map has no deviation.");
+  if (deviation.size() == 0) {
+    page.note("Nothing that was fitted changes b, so the map has no deviation.");
+  } else if (!known_somewhere) {
+    page.note(
+        "b has no finite deviation anywhere: a parameter that the footage does not determine acts on the "
+        "whole "
+        "patch.");
+  }
   add_strengths(page, data);
 }
 

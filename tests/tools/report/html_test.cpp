@@ -41,7 +41,11 @@ TEST(HtmlPage, EscapesEverything) {
   page.facts({{evil, evil}});
   page.code(evil);
   page.table({{evil, evil}, {{evil, TableCell(evil, {0, 0, 0})}}, evil});
-  page.svg_figure(svg(BarChart{evil, {evil}, {evil}, {{evil, {1}, {}}}}), evil, evil);
+  BarChart chart;
+  chart.title = chart.y.label = evil;
+  chart.series = {evil};
+  chart.groups = {{evil, {1}, {}}};
+  page.svg_figure(svg(chart), evil, evil);
   page.image_figure(png_uri(std::string("\0\1\2", 3)), 3, 2, evil, evil);
   page.section("b", "second");
   page.begin_row();

@@ -120,6 +120,22 @@ TEST(Report, AFitThatEndedEarlyHasAPageToo) {
   EXPECT_THAT(html, AllOf(HasSubstr("Not converged: failed: the forward run"), HasSubstr("not determined")));
 }
 
+TEST(Report, AnOpenParameterClaimsNothing) {
+  const std::string folder = folder_for("open");
+  fitting::FitResult fit = test::write_synthetic_fit(folder, 1);
+  fitting::FittedParameter& open = fit.parameters[2];
+  open.value = 0.0024, open.determined = false, open.sigma = 846;
+  open.low95 = open.lower, open.high95 = open.upper;
+  fit.history.back().cost = 1e304;  // a trial that failed
+  fitting::write_fit_result(fit, folder);
+  const std::string html = without_pictures(read_file(report(folder, false).path));
+  EXPECT_THAT(html,
+              HasSubstr("right strength: not determined by this footage (the fit ended at 0.0024 1/mm). "
+                        "The truth is 3 1/mm."));
+  EXPECT_THAT(html, HasSubstr("b has no finite deviation anywhere"));
+  EXPECT_THAT(html, AllOf(Not(HasSubstr("e304")), Not(HasSubstr("1e30"))));
+}
+
 TEST(Report, FindsFilesAfterTheFolderMoved) {
   const std::string folder = folder_for("before_move"), moved = folder_for("after_move");
   test::write_synthetic_fit(folder, 1);
