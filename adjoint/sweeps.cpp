@@ -1,5 +1,6 @@
 #include "adjoint/sweeps.h"
 
+#include <algorithm>
 #include <chrono>
 
 #include "sim/core/error.h"

@@ -230,6 +230,11 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
   const VectorXd t = problem.best().size() > 0 ? problem.best() : problem.parametrisation().initial();
   const auto linearised = have_point ? problem.linearised(t) : std::nullopt;
   const FitEvaluation* at = have_point ? &problem.evaluate(t) : nullptr;
+  if (at != nullptr && at->failed) at = nullptr;  // stopped while the best point was run again
+  if (problem.was_stopped()) {
+    result.converged = false;
+    result.status = "failed: stopped by the user";
+  }
   if (at != nullptr) {
     result.final_cost = at->cost;
     add_residuals(problem, input.tracks, *at, result);

@@ -74,7 +74,7 @@ OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& opt
   const std::optional<MatrixXd> jacobian = problem.jacobian(outcome.t);
   if (!jacobian) {
     outcome.status = problem.was_stopped() ? Status::stopped : Status::failed;
-    outcome.detail = "the first forward run failed: " + first.failure;
+    outcome.detail = "the first run failed or could not be differentiated: " + first.failure;
     return outcome;
   }
   ScaledObjective objective{.problem = problem,
@@ -86,7 +86,7 @@ OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& opt
   // A unit step then changes F by about its first value: Hessian diagonal JᵀJ scaled to 2F.
   for (int k = 0; k < n; ++k) {
     const double norm = jacobian->col(k).norm();
-    if (norm > 0) objective.scale[k] = std::min(1.0, std::sqrt(2 * first.cost) / norm);
+    if (norm > 0) objective.scale[k] = std::clamp(std::sqrt(2 * first.cost) / norm, 1e-6, 1.0);
   }
   nlopt::opt optimiser(nlopt::LD_SLSQP, n);
   std::vector<double> lower(n), upper(n), y(n, 0.0);
@@ -97,7 +97,8 @@ OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& opt
   optimiser.set_lower_bounds(lower);
   optimiser.set_upper_bounds(upper);
   optimiser.set_min_objective(ScaledObjective::call, &objective);
-  optimiser.set_ftol_rel(options.relative_decrease);
+  // A gradient method creeps where Levenberg-Marquardt jumps: a small decrease says less.
+  optimiser.set_ftol_rel(1e-2 * options.relative_decrease);
   optimiser.set_xtol_rel(options.step_tolerance);
   optimiser.set_maxeval(options.max_evaluations);
   double minimum = 0;
@@ -111,6 +112,9 @@ OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& opt
   } catch (const nlopt::roundoff_limited&) {
     outcome.status = Status::converged;  // no further decrease within rounding
     outcome.detail = "limited by rounding";
+  } catch (const std::invalid_argument& error) {  // how NLopt reports unusable bounds
+    outcome.status = Status::failed;
+    outcome.detail = std::string("NLopt: ") + error.what();
   } catch (const std::runtime_error& error) {
     outcome.status = Status::failed;
     outcome.detail = std::string("NLopt: ") + error.what();

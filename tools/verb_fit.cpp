@@ -81,6 +81,7 @@ class Fit : public Verb {
     for (const std::string& sentence : report.left_out) context.progress.warning(sentence);
     context.progress.finish();
     context.out << report.path << '\n';
+    if (report.interrupted) return ExitCode::interrupted;
     return result.converged ? ExitCode::ok : ExitCode::not_converged;
   }
 

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <ostream>
@@ -30,7 +31,10 @@ void write_overlay_picture(const std::string& video, int frame, const std::strin
   cv::VideoCapture capture(video);
   cv::Mat picture, last;
   for (int i = 0; i <= frame && capture.read(picture); ++i) last = picture.clone();
-  if (last.empty() || !cv::imwrite(path, last)) throw InputError(path, "no picture", "a writable folder");
+  std::vector<unsigned char> png;
+  if (last.empty() || !cv::imencode(".png", last, png))
+    throw InputError(path, "no picture", "a readable overlay");
+  write_file(path, std::string(png.begin(), png.end()));
 }
 
 class TrackVerb : public Verb {
@@ -59,6 +63,7 @@ class TrackVerb : public Verb {
   }
 
   ExitCode run(VerbContext& context) override {
+    cv::setNumThreads(context.options.threads);
     if (context.options.file.empty() && video_.empty())
       throw InputError("track", "neither a case nor --video", "one of the two");
     if (frames_ < 0) throw InputError("--frames", std::to_string(frames_), "1 or more");

@@ -48,7 +48,7 @@ GridPattern grid_pattern(const std::string& name) {
 
 }  // namespace
 
-/// Diffused weights at the diffusion times asked for last; several fits may share a model between threads.
+/// Diffused weights at every diffusion time asked for (a fit of the diffusion time asks for a few dozen).
 struct SceneModel::HeatCache {
   std::mutex mutex;
   std::map<double, HeatMapWeights> by_time;
