@@ -16,8 +16,8 @@ void insert(RuleNode& root, const Rule& rule) {
     if (const RuleNode* found = node->child(key)) {
       node = const_cast<RuleNode*>(found);
     } else {
-      node->children.emplace_back(key, RuleNode{});
-      node = &node->children.back().second;
+      node->children.push_back({key, RuleNode{}});
+      node = &node->children.back().node;
     }
     begin = end + 1;
   }

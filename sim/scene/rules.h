@@ -48,15 +48,22 @@ struct Rule {
 /// All rules, parents before children, in the order of the documentation. The root has the pointer "".
 const std::vector<Rule>& scene_rules();
 
+struct RuleEntry;
+
 /// The rules as a tree.
 struct RuleNode {
   const Rule* rule = nullptr;
-  std::vector<std::pair<std::string, RuleNode>> children;  ///< of an object by key; of an array one, "*"
+  std::vector<RuleEntry> children;  ///< of an object by key; of an array one, "*"
 
   /// Child for a key, or null.
   const RuleNode* child(std::string_view key) const;
   /// Whether this is an array whose items have names, so that an address may use them in place of numbers.
   bool is_named_list() const;
+};
+/// A child and its key.
+struct RuleEntry {
+  std::string key;
+  RuleNode node;
 };
 /// The tree of a table, parents before children. The rules must outlive it.
 RuleNode build_rule_tree(const std::vector<Rule>& rules);

@@ -130,7 +130,7 @@ class Resolver {
     if (place.pointer.empty() && key == "extends")
       throw InputError(where(place.key(key)), "extends", "a scene that has been read from its file");
     std::vector<std::string> known;
-    for (const auto& child : node.children) known.push_back(child.first);
+    for (const auto& child : node.children) known.push_back(child.key);
     throw InputError(where(place.key(key)), "the unknown key " + shown_json(key),
                      "a known key, nearest is \"" + nearest_word(key, known) + "\"");
   }
