@@ -160,6 +160,8 @@ std::string type_text(const Rule& rule) {
       return "3 numbers";
     case RuleType::integers2:
       return "2 integers";
+    case RuleType::quantity:
+      return "number with a unit";
     case RuleType::option:
       break;
   }
