@@ -37,7 +37,7 @@ class Fit : public Verb {
         "case.json, its scene; tracks.csv and camera.yaml from the case or the -o folder; truth.json of the "
         "-o folder if there is one",
         "fit.json, residuals.csv, answer.txt, report.html, and the table of answer.txt on stdout",
-        "rhytid fit data/cases/twin/case.json -o run/twin"};
+        "rhytid fit data/scenes/demo/case.json -o run/demo"};
   }
   void add_options(CLI::App& app) override {
     app.add_option("--optimiser", optimiser_, "ceres or nlopt instead of what the case says")

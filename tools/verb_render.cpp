@@ -42,7 +42,7 @@ class Render : public Verb {
         "case.json, its scenes and camera",
         "footage.avi or .mp4, frame_*.png (first, middle, last), camera.yaml, truth_tracks.csv, truth.json, "
         "truth_motion.bin",
-        "rhytid render data/cases/twin/case.json -o run/twin"};
+        "rhytid render data/scenes/demo/case.json -o run/demo"};
   }
   void add_options(CLI::App& app) override {
     app.add_flag("--keep-motion", keep_motion_,

@@ -22,7 +22,7 @@ class Report : public Verb {
         "by itself at its end; use this verb to make it again.",
         "fit.json and residuals.csv in the folder, and the scene, camera and footage that they name",
         "report.html in the same folder",
-        "rhytid report run/twin"};
+        "rhytid report run/demo"};
   }
   bool takes_file() const override { return false; }
   void add_options(CLI::App& app) override {

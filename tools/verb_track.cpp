@@ -49,7 +49,7 @@ class TrackVerb : public Verb {
         "case.json with its footage, camera and scene; or a video",
         "tracks.csv, overlay.mp4, overlay.png, track.json; beside rendered footage also the error against "
         "the truth",
-        "rhytid track data/cases/twin/case.json -o run/twin"};
+        "rhytid track data/scenes/demo/case.json -o run/demo"};
   }
   bool file_is_optional() const override { return true; }
   void add_options(CLI::App& app) override {

@@ -17,7 +17,7 @@
 // Shapes   contact θ = κ, inflation, c [3]; friction θ = κ, inflation, μ, c [3], c_old [3]; lag = f_n, n [3].
 //          rest = X [3], g₀.
 // Smooth   contact C² (ε > 0) or C¹; friction C² (quintic) or C¹ (quadratic).
-// Tests    tests/sim/terms/contact_law_test.cpp
+// Tests    tests/sim/terms/law_edges_test.cpp, law_properties_test.cpp
 #pragma once
 
 #include <array>

@@ -8,7 +8,7 @@
 //          is continued by its tangent, so that trial steps stay finite.
 // Units    k [MPa], b [1/mm], ε [mm], u [mm]; Ψ [mJ/mm²].     Shapes  e = u [3], θ = k, ε, b.
 // Smooth   analytic below b s = 50, C¹ in the force there.
-// Tests    tests/sim/terms/ligament_law_test.cpp
+// Tests    tests/sim/terms/law_edges_test.cpp, law_properties_test.cpp
 #pragma once
 
 #include "sim/math/dual.h"

@@ -10,7 +10,7 @@
 // kernels are compiled once per instruction set.
 //
 // Shapes   natural gradients table [q·R + r][npad], R = 3 on prisms, 1 on surfaces; element vectors [n][3].
-// Tests    tests/sim/terms/point_term_test.cpp
+// Tests    tests/sim/terms/term_kernels_test.cpp
 #pragma once
 
 #include <cmath>

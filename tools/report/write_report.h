@@ -1,5 +1,5 @@
 // report.html of a fit: one file that holds everything, for the end of `rhytid fit` and for `rhytid report`.
-// Tests: tests/tools/report_test.cpp
+// Tests: tests/tools/report/report_test.cpp
 #pragma once
 
 #include <string>
