@@ -70,8 +70,9 @@ TEST(BundledScenes, head_rests_in_equilibrium) {
         load_scene(RHYTID_SOURCE_DIR "/data/scenes/" + name + "/scene.json", {"/skin/surface/file=" + head}));
     const StepCost cost = measure_step_cost(scene_model);
     EXPECT_EQ(cost.rest_residual, 0) << name;
-    if (name == "head_forehead")
+    if (name == "head_forehead") {
       EXPECT_THAT(review_scene(scene_model, cost), Each(HasSubstr("too coarse to wrinkle")));
+    }
   }
 }
 
