@@ -89,7 +89,7 @@ std::vector<EnvironmentFact> simulator_environment(int threads) {
       {"threads", std::to_string(threads) + " in use, " + std::to_string(omp_get_num_procs()) +
                       " cores, OpenMP " + std::to_string(_OPENMP) + ", OpenBLAS " +
                       std::to_string(openblas_get_num_threads())},
-      {"dgemm_ is answered by", blas.name + ", " + blas.library, blas_verdict},
+      {"dgemm_ is answered by", blas.name + ", " + blas.shared_object, blas_verdict},
       {"BLAS configuration", blas.config.empty() ? "unknown" : blas.config},
       {"BLAS and LAPACK loaded", join(loaded_blas_libraries(), " ")},
       {"Eigen", dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},

@@ -34,14 +34,15 @@ BlasInfo blas_info() {
   if (!dgemm) dgemm = reinterpret_cast<void*>(&dgemm_);
   Dl_info where{};
   if (!dladdr(dgemm, &where) || !where.dli_fname) return info;
-  info.library = resolved_path(where.dli_fname);
+  info.shared_object = resolved_path(where.dli_fname);
   if (void* config = symbol_in(where.dli_fname, "openblas_get_config")) {
     info.name = "openblas";
     info.config = reinterpret_cast<char* (*)()>(config)();
-  } else if (symbol_in(where.dli_fname, "ATL_dgemm") || info.library.find("atlas") != std::string::npos) {
+  } else if (symbol_in(where.dli_fname, "ATL_dgemm") ||
+             info.shared_object.find("atlas") != std::string::npos) {
     info.name = "atlas";
-  } else if (info.library.find("/libblas") != std::string::npos ||
-             info.library.find("/blas/") != std::string::npos) {
+  } else if (info.shared_object.find("/libblas") != std::string::npos ||
+             info.shared_object.find("/blas/") != std::string::npos) {
     info.name = "reference";
   }
   return info;

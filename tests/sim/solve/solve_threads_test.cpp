@@ -66,8 +66,8 @@ TEST(SolveThreads, FactorisationStaysOnTheCallingThread) {
 
 TEST(BlasInfo, OpenBlasAnswers) {
   const BlasInfo info = blas_info();
-  EXPECT_EQ(info.name, "openblas") << info.library;
-  EXPECT_NE(info.library.find("openblas"), std::string::npos) << info.library;
+  EXPECT_EQ(info.name, "openblas") << info.shared_object;
+  EXPECT_NE(info.shared_object.find("openblas"), std::string::npos) << info.shared_object;
   EXPECT_NE(info.config.find("OpenBLAS"), std::string::npos) << info.config;
 }
 
