@@ -9,8 +9,8 @@ namespace rhytid {
 struct BlasInfo {
   std::string shared_object;  ///< path of the shared object, symbolic links resolved; the program itself if
                               ///< linked statically
-  std::string name;    ///< "openblas", "atlas", "reference" or "unknown"
-  std::string config;  ///< OpenBLAS's own description (version, kernel, threading); empty otherwise
+  std::string name;           ///< "openblas", "atlas", "reference" or "unknown"
+  std::string config;         ///< OpenBLAS's own description (version, kernel, threading); empty otherwise
 };
 
 /// Never throws on an unknown library; reports it as "unknown".
