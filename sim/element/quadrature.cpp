@@ -1,5 +1,6 @@
 #include "sim/element/quadrature.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -27,7 +28,48 @@ std::vector<TriangleRule> stored_rules() {
   return rules;
 }
 
+struct StoredPrismPoint {
+  int degree;
+  const char* name;
+  double u, v, w, weight;
+};
+
+constexpr StoredPrismPoint stored_prism_points[] = {
+#include "sim/element/prism_rules.inc"
+};
+
+std::vector<PrismRule> stored_prism_rules() {
+  std::vector<PrismRule> rules;
+  PrismRule sheet = tensor_rule(triangle_rule(1), 2);
+  sheet.degree = 1;
+  rules.push_back(std::move(sheet));
+  for (const StoredPrismPoint& point : stored_prism_points) {
+    if (rules.back().degree != point.degree) rules.push_back({point.name, point.degree, {}});
+    rules.back().points.push_back({point.u, point.v, point.w, point.weight});
+  }
+  return rules;
+}
+
 }  // namespace
+
+const PrismRule& prism_rule(int degree) {
+  static const std::vector<PrismRule> rules = stored_prism_rules();
+  require(degree >= 1, "prism_rule: the degree must be at least 1");
+  for (const PrismRule& rule : rules)
+    if (rule.degree >= degree) return rule;
+  throw ContractError("prism_rule: degree " + std::to_string(degree) +
+                      " is above the highest stored degree " + std::to_string(rules.back().degree));
+}
+
+PrismRule tensor_rule(const TriangleRule& triangle, int num_points) {
+  PrismRule rule{triangle.name + " x GL" + std::to_string(num_points),
+                 std::min(triangle.degree, 2 * num_points - 1),
+                 {}};
+  const std::vector<LinePoint> line = gauss_legendre(num_points);
+  for (const TrianglePoint& t : triangle.points)
+    for (const LinePoint& l : line) rule.points.push_back({t.u, t.v, l.w, t.weight * l.weight});
+  return rule;
+}
 
 const TriangleRule& triangle_rule(int degree) {
   static const std::vector<TriangleRule> rules = stored_rules();

@@ -12,34 +12,37 @@ namespace rhytid {
 
 TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab,
                       const TriangleRule& rule, int thickness_points) {
+  return prism_group(mesh, element_layer, slab, tensor_rule(rule, thickness_points));
+}
+
+TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab,
+                      const PrismRule& rule) {
   const TriangleBasis triangle(mesh.order);
   const ElementLayer& layer = mesh.element_layers[element_layer];
   const LineBasis line(layer.order);
-  const auto gauss = gauss_legendre(thickness_points);
   const int np = triangle.num_nodes(), nq = line.num_nodes(), n = np * nq;
   TermGroup g;
   g.num_elements = mesh.num_faces;
   g.num_nodes = n;
-  g.num_points = static_cast<int>(rule.points.size() * gauss.size());
+  g.num_points = static_cast<int>(rule.points.size());
   g.material = slab.material;
   g.node_by_row.resize(static_cast<std::size_t>(3) * g.num_points * n);
   std::vector<double> reference_weight(g.num_points);
   std::vector<double> p(np), pu(np), pv(np), t(nq), tw(nq);
   const double half = 0.5 * (slab.w_end - slab.w_begin);
   int q = 0;
-  for (const TrianglePoint& tp : rule.points)
-    for (const LinePoint& lp : gauss) {
-      triangle.evaluate(tp.u, tp.v, p.data(), pu.data(), pv.data());
-      line.evaluate(slab.w_begin + half * (lp.w + 1), t.data(), tw.data());
-      double* rows = g.node_by_row.data() + static_cast<std::size_t>(3) * q * n;
-      for (int j = 0; j < np; ++j)
-        for (int k = 0; k < nq; ++k) {
-          rows[j * nq + k] = pu[j] * t[k];
-          rows[n + j * nq + k] = pv[j] * t[k];
-          rows[2 * n + j * nq + k] = p[j] * tw[k];
-        }
-      reference_weight[q++] = tp.weight * lp.weight * half;
-    }
+  for (const PrismPoint& point : rule.points) {
+    triangle.evaluate(point.u, point.v, p.data(), pu.data(), pv.data());
+    line.evaluate(slab.w_begin + half * (point.w + 1), t.data(), tw.data());
+    double* rows = g.node_by_row.data() + static_cast<std::size_t>(3) * q * n;
+    for (int j = 0; j < np; ++j)
+      for (int k = 0; k < nq; ++k) {
+        rows[j * nq + k] = pu[j] * t[k];
+        rows[n + j * nq + k] = pv[j] * t[k];
+        rows[2 * n + j * nq + k] = p[j] * tw[k];
+      }
+    reference_weight[q++] = point.weight * half;
+  }
   g.inverse_jacobian.resize(static_cast<std::size_t>(g.num_elements) * g.num_points * 9);
   g.weight.resize(static_cast<std::size_t>(g.num_elements) * g.num_points);
   for (int face = 0; face < mesh.num_faces; ++face) {

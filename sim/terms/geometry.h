@@ -8,9 +8,11 @@
 
 namespace rhytid {
 
-/// Points of one material slab in one element layer: triangle rule × Gauss-Legendre of `thickness_points` in
-/// the slab. Everything but theta is filled. Throws InputError when an element is inverted at a point (names
-/// the face).
+/// Points of one material slab in one element layer: the rule mapped to the slab. Everything but theta is
+/// filled. Throws InputError when an element is inverted at a point (names the face).
+TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab,
+                      const PrismRule& rule);
+/// The same with the product of a triangle rule and Gauss-Legendre of `thickness_points`.
 TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab,
                       const TriangleRule& rule, int thickness_points);
 

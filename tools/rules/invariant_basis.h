@@ -20,6 +20,8 @@ class InvariantBasis {
  public:
   explicit InvariantBasis(int degree);
   int size() const { return static_cast<int>(powers_.size()); }
+  /// Total degree of φₖ; rises with k.
+  int degree_of(int k) const { return 2 * powers_[k].s + 3 * powers_[k].t; }
 
   template <typename T>
   void evaluate(T a, T b, InvariantValues<T>& out) const;
