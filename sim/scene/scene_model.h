@@ -1,27 +1,23 @@
 // From a scene to a model: mesh, the terms the scene needs (and no others), native parameters; and the map
 // between scene parameters (addresses) and native ones.
 //
-// Native parameters, in this order: per layer "layer/<name>": μ∞, C, K, μ_m, τ; "ligaments": k, ε;
-// "ligaments/b": b per column; "base": κ, inflation, centre [3]; per collider "collider/<name>": κ,
-// inflation, μ, then its path knots [3] each.
+// The scene is made of parts (parts/scene_part.h): skin, ligaments, base, colliders, each with its native
+// parameters, terms and derivatives; the native vector and the terms follow that order.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "sim/scene/parts/scene_part.h"
 #include "sim/scene/scene.h"
 #include "sim/time/model.h"
 #include "sim/time/simulate.h"
 
 namespace rhytid {
 
-/// A term of the scene and whether it is there, with the reason when not: what `check` prints.
-struct FeatureNote {
-  std::string feature;
-  bool present;
-  std::string detail;
-};
+class LigamentPart;
 
 class SceneModel {
  public:
@@ -44,27 +40,19 @@ class SceneModel {
 
   /// Ligament parameter b per column for a scene, 1/mm; empty without ligaments.
   VectorXd ligament_map(const Scene& scene) const;
-  /// Where each source sits on the inner surface, mm, after projection.
-  const std::vector<Vec3>& source_positions() const { return source_positions_; }
-  /// Triangles of the P1 refinement through all columns.
-  const std::vector<std::array<int, 3>>& column_triangles() const { return column_triangles_; }
+  /// Where each source sits on the inner surface, mm, after projection; empty without ligaments.
+  const std::vector<Vec3>& source_positions() const;
+  /// Triangles of the P1 refinement through all columns; empty without ligaments.
+  const std::vector<std::array<int, 3>>& column_triangles() const;
+  /// The ligaments, null without.
+  const LigamentPart* ligaments() const { return ligaments_.get(); }
 
  private:
-  struct HeatCache;
-  void build_mesh();
-  void build_native();
-  void build_skin();
-  void build_ligaments();
-  void build_contacts();
-  void build_constraints();
-  const struct HeatMapWeights& heat(double time) const;
-
   Scene scene_;
   Model model_;
+  std::vector<std::shared_ptr<const ScenePart>> parts_;
+  std::shared_ptr<const LigamentPart> ligaments_;  // also one of parts_
   std::vector<FeatureNote> features_;
-  std::vector<Vec3> source_positions_;
-  std::vector<std::array<int, 3>> column_triangles_;
-  std::shared_ptr<HeatCache> heat_cache_;
 };
 
 }  // namespace rhytid

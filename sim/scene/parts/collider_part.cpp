@@ -1,0 +1,103 @@
+#include "sim/scene/parts/collider_part.h"
+
+#include "sim/surface/shapes.h"
+#include "sim/terms/contact_law.h"
+#include "sim/terms/geometry.h"
+
+namespace rhytid {
+
+namespace {
+
+double radius_of(const ColliderScene& c) {
+  return c.shape == ShapeKind::sphere ? c.radius : 0;
+}
+
+std::shared_ptr<const ImplicitShape> collider_shape(const ColliderScene& c) {
+  if (c.shape == ShapeKind::plane) return std::make_shared<Plane>(c.normal);
+  return std::make_shared<Sphere>(c.radius);
+}
+
+bool has_friction(const ColliderScene& c) {
+  return c.friction && c.friction->coefficient > 0;
+}
+
+/// Slots of the collider's position now or at the start of the step; `offset` is the first knot's.
+void add_path_slots(const ColliderScene& c, ThetaSlot::Kind kind, int offset, TermGroup& g) {
+  std::vector<double> times;
+  for (const PathKnot& k : c.path) times.push_back(k.time);
+  for (int axis = 0; axis < 3; ++axis) g.theta.push_back({kind, offset + axis, times});
+}
+
+}  // namespace
+
+ColliderPart::ColliderPart(const Scene& scene) {
+  for (const ColliderScene& c : scene.colliders) built_radii_.push_back(radius_of(c));
+}
+
+void ColliderPart::add_native_blocks(const Scene& scene, Model& model) const {
+  for (const ColliderScene& c : scene.colliders)
+    add_native_block(model, "collider/" + c.name, 3 + 3 * static_cast<int>(c.path.size()), {0});
+}
+
+void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const {
+  const TriangleRule& rule = triangle_rule(contact_degree(scene));
+  bool friction = false;
+  for (const ColliderScene& c : scene.colliders) {
+    model.shapes.push_back(collider_shape(c));
+    const ImplicitShape* shape = model.shapes.back().get();
+    const int base = model.native_block("collider/" + c.name).offset;
+    {
+      Term term("contact " + c.name, contact_kernels(), ContactLaw{shape, c.onset});
+      TermGroup g = surface_group(model.mesh, SkinSide::outer, rule);
+      g.theta = {constant_slot(base), constant_slot(base + 1)};
+      add_path_slots(c, ThetaSlot::Kind::path_now, base + 3, g);
+      term.add_group(std::move(g));
+      model.terms.push_back(std::move(term));
+    }
+    if (has_friction(c)) {
+      friction = true;
+      Term term(
+          "friction " + c.name, friction_kernels(),
+          FrictionLaw{shape, c.onset, c.friction->slip_speed,
+                      c.friction->mollifier == "quadratic" ? Mollifier::quadratic : Mollifier::quintic});
+      TermGroup g = surface_group(model.mesh, SkinSide::outer, rule);
+      g.theta = {constant_slot(base), constant_slot(base + 1), constant_slot(base + 2)};
+      add_path_slots(c, ThetaSlot::Kind::path_now, base + 3, g);
+      add_path_slots(c, ThetaSlot::Kind::path_old, base + 3, g);
+      term.add_group(std::move(g));
+      model.terms.push_back(std::move(term));
+    }
+  }
+  const bool contact = !scene.colliders.empty();
+  features.push_back(
+      {"contact", contact, contact ? std::to_string(scene.colliders.size()) + " colliders" : "no colliders"});
+  features.push_back(
+      {"friction", friction,
+       friction ? "lagged pressure and normal at every contact point" : "no collider has friction"});
+}
+
+void ColliderPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
+  for (std::size_t k = 0; k < scene.colliders.size(); ++k) {
+    const ColliderScene& c = scene.colliders[k];
+    const int at = model.native_block("collider/" + c.name).offset;
+    native[at] = c.stiffness;
+    native[at + 1] = radius_of(c) - built_radii_[k];
+    native[at + 2] = c.friction ? c.friction->coefficient : 0;
+    for (std::size_t i = 0; i < c.path.size(); ++i)
+      native.segment<3>(static_cast<Eigen::Index>(at + 3 + 3 * i)) = c.path[i].position;
+  }
+}
+
+bool ColliderPart::add_derivative(const Scene& scene, const Model& model, const std::string& address,
+                                  VectorXd& d) const {
+  for (const ColliderScene& c : scene.colliders) {
+    const std::string key = key_after(address, "colliders", c.name);
+    const int slot = key == "stiffness" ? 0 : key == "radius" ? 1 : key == "friction/coefficient" ? 2 : -1;
+    if (slot < 0) continue;
+    d[model.native_block("collider/" + c.name).offset + slot] = 1;
+    return true;
+  }
+  return false;
+}
+
+}  // namespace rhytid

@@ -1,0 +1,148 @@
+#include "sim/scene/parts/ligament_part.h"
+
+#include <algorithm>
+#include <list>
+#include <mutex>
+
+#include "sim/core/error.h"
+#include "sim/element/basis.h"
+#include "sim/surface/project_to_surface.h"
+#include "sim/terms/geometry.h"
+#include "sim/terms/ligament_law.h"
+
+namespace rhytid {
+
+namespace {
+
+std::vector<std::array<int, 3>> refined_triangles(const SkinMesh& mesh) {
+  const TriangleBasis basis(mesh.order);
+  const int n = basis.num_nodes();
+  std::vector<std::array<int, 3>> triangles;
+  for (int face = 0; face < mesh.num_faces; ++face)
+    for (const auto& t : basis.subtriangles()) {
+      std::array<int, 3> columns;
+      for (int k = 0; k < 3; ++k) columns[k] = mesh.face_columns[static_cast<std::size_t>(face) * n + t[k]];
+      triangles.push_back(columns);
+    }
+  return triangles;
+}
+
+/// Column of a vertex of the input surface, −1 when it was cropped away.
+int column_of_vertex(const SkinMesh& mesh, int vertex) {
+  const auto& from = mesh.surface.source_vertex;
+  int local = vertex;
+  if (!from.empty()) {
+    const auto it = std::find(from.begin(), from.end(), vertex);
+    local = it == from.end() ? -1 : static_cast<int>(it - from.begin());
+  }
+  const bool exists = local >= 0 && local < static_cast<int>(mesh.vertex_columns.size());
+  return exists ? mesh.vertex_columns[local] : -1;
+}
+
+}  // namespace
+
+/// Most recently used first.
+struct LigamentPart::HeatCache {
+  struct Entry {
+    double time;
+    std::shared_ptr<const HeatMapWeights> weights;
+  };
+  std::mutex mutex;
+  std::list<Entry> entries;
+};
+
+LigamentPart::LigamentPart(const Scene& scene, const SkinMesh& mesh)
+    : inner_(inner_rest_nodes(mesh)),
+      column_triangles_(refined_triangles(mesh)),
+      heat_cache_(std::make_shared<HeatCache>()) {
+  for (const SourceScene& s : scene.ligaments->sources) {
+    Vec3 position = s.position;
+    if (s.vertex) {
+      const int column = column_of_vertex(mesh, *s.vertex);
+      if (column < 0)
+        throw InputError(scene.file + ": /ligaments/sources/" + s.name + "/vertex", std::to_string(*s.vertex),
+                         "a vertex of the cropped surface");
+      position = inner_.row(column).transpose();
+    }
+    source_positions_.push_back(project_to_surface(inner_, column_triangles_, position).point);
+    heat_sources_.push_back({source_positions_.back(), s.radius});
+  }
+}
+
+void LigamentPart::add_native_blocks(const Scene&, Model& model) const {
+  add_native_block(model, "ligaments", 2, {0});
+  add_native_block(model, "ligaments/b", model.mesh.num_columns, {});
+}
+
+void LigamentPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const {
+  Term term("ligaments", ligament_kernels(), LigamentLaw{});
+  TermGroup g = surface_group(model.mesh, SkinSide::inner, triangle_rule(contact_degree(scene)));
+  g.rest.clear();
+  const int base = model.native_block("ligaments").offset;
+  g.theta = {constant_slot(base),
+             constant_slot(base + 1),
+             {ThetaSlot::Kind::field, model.native_block("ligaments/b").offset, {}}};
+  term.add_group(std::move(g));
+  model.terms.push_back(std::move(term));
+  features.push_back({"ligaments", true, std::to_string(source_positions_.size()) + " sources"});
+}
+
+std::shared_ptr<const HeatMapWeights> LigamentPart::heat(double time) const {
+  const std::lock_guard lock(heat_cache_->mutex);
+  auto& entries = heat_cache_->entries;
+  const auto it =
+      std::find_if(entries.begin(), entries.end(), [&](const auto& entry) { return entry.time == time; });
+  if (it != entries.end()) {
+    entries.splice(entries.begin(), entries, it);
+  } else {
+    entries.push_front({time, std::make_shared<const HeatMapWeights>(
+                                  diffuse_sources(inner_, column_triangles_, heat_sources_, time))});
+    if (entries.size() > kHeatMapsKept) entries.pop_back();
+  }
+  return entries.front().weights;
+}
+
+std::size_t LigamentPart::heat_maps_kept() const {
+  const std::lock_guard lock(heat_cache_->mutex);
+  return heat_cache_->entries.size();
+}
+
+VectorXd LigamentPart::map(const Scene& scene) const {
+  VectorXd strengths(scene.ligaments->sources.size());
+  for (Eigen::Index s = 0; s < strengths.size(); ++s) strengths[s] = scene.ligaments->sources[s].strength;
+  return heat(scene.ligaments->diffusion_time)->weights * strengths;
+}
+
+void LigamentPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
+  const int at = model.native_block("ligaments").offset;
+  double thickness = 0;
+  for (const LayerScene& l : scene.skin.layers) thickness += l.thickness;
+  native[at] = scene.ligaments->stiffness;
+  native[at + 1] = scene.ligaments->smoothing > 0 ? scene.ligaments->smoothing : 1e-2 * thickness;
+  const NativeBlock& b = model.native_block("ligaments/b");
+  native.segment(b.offset, b.size) = map(scene);
+}
+
+bool LigamentPart::add_derivative(const Scene& scene, const Model& model, const std::string& address,
+                                  VectorXd& d) const {
+  if (address == "/ligaments/stiffness") {
+    d[model.native_block("ligaments").offset] = 1;
+    return true;
+  }
+  const NativeBlock& b = model.native_block("ligaments/b");
+  const std::vector<SourceScene>& sources = scene.ligaments->sources;
+  if (address == "/ligaments/diffusion_time") {
+    const auto weights = heat(scene.ligaments->diffusion_time);
+    for (std::size_t s = 0; s < sources.size(); ++s)
+      d.segment(b.offset, b.size) += weights->d_weights_d_time.col(s) * sources[s].strength;
+    return true;
+  }
+  for (std::size_t s = 0; s < sources.size(); ++s)
+    if (key_after(address, "ligaments/sources", sources[s].name) == "strength") {
+      d.segment(b.offset, b.size) = heat(scene.ligaments->diffusion_time)->weights.col(s);
+      return true;
+    }
+  return false;
+}
+
+}  // namespace rhytid

@@ -1,0 +1,49 @@
+// The retaining ligaments of a scene: sources on the inner surface, the heat map that spreads their
+// strengths, and the term.
+//
+// Native blocks "ligaments": k, ε; "ligaments/b": b per column.
+#pragma once
+
+#include <array>
+
+#include "sim/scene/parts/scene_part.h"
+#include "sim/surface/heat_map.h"
+
+namespace rhytid {
+
+class LigamentPart final : public ScenePart {
+ public:
+  /// Places the sources. scene.ligaments must be there. Throws InputError for a vertex outside the crop.
+  LigamentPart(const Scene& scene, const SkinMesh& mesh);
+
+  void add_native_blocks(const Scene& scene, Model& model) const override;
+  void add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const override;
+  void set_native(const Scene& scene, const Model& model, VectorXd& native) const override;
+  bool add_derivative(const Scene& scene, const Model& model, const std::string& address,
+                      VectorXd& derivative) const override;
+
+  /// b per column, 1/mm.
+  VectorXd map(const Scene& scene) const;
+  /// Where each source sits on the inner surface, mm, after projection.
+  const std::vector<Vec3>& source_positions() const { return source_positions_; }
+  /// Triangles of the P1 refinement through all columns.
+  const std::vector<std::array<int, 3>>& column_triangles() const { return column_triangles_; }
+
+  /// Diffused weights for a diffusion time, mm². Safe from several threads; the last kHeatMapsKept are kept
+  /// (a line search returns to the ones before it), and a returned map lives as long as its holder.
+  std::shared_ptr<const HeatMapWeights> heat(double time) const;
+  /// How many maps are kept now.
+  std::size_t heat_maps_kept() const;
+  static constexpr std::size_t kHeatMapsKept = 4;
+
+ private:
+  struct HeatCache;
+
+  MatrixX3 inner_;
+  std::vector<std::array<int, 3>> column_triangles_;
+  std::vector<Vec3> source_positions_;
+  std::vector<HeatSource> heat_sources_;
+  std::shared_ptr<HeatCache> heat_cache_;
+};
+
+}  // namespace rhytid

@@ -1,0 +1,22 @@
+// The skin of a scene: its prism mesh and its layers' elasticity and viscosity.
+//
+// Native block per layer "layer/<name>": μ∞, C, K, μ_m, τ (SkinTheta).
+#pragma once
+
+#include "sim/scene/parts/scene_part.h"
+
+namespace rhytid {
+
+/// The prism mesh of a scene: reads or makes the surface, crops, bends, extrudes. Throws InputError.
+SkinMesh build_skin_mesh(const SkinScene& skin);
+
+class SkinPart final : public ScenePart {
+ public:
+  void add_native_blocks(const Scene& scene, Model& model) const override;
+  void add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const override;
+  void set_native(const Scene& scene, const Model& model, VectorXd& native) const override;
+  bool add_derivative(const Scene& scene, const Model& model, const std::string& address,
+                      VectorXd& derivative) const override;
+};
+
+}  // namespace rhytid
