@@ -22,10 +22,7 @@ Trajectory resimulate(const Model& model, const VectorXd& native, const Trajecto
       q = model.to_unknowns(guess(i, current));
       report = minimise(problem, q, options, factor, matrix);
     }
-    if (!report.converged()) {
-      q = model.to_unknowns(current.u);
-      report = minimise(problem, q, options, factor, matrix);
-    }
+    if (!report.converged()) report = solve_step(problem, current, options, factor, matrix, q);
     if (!report.converged()) {
       run.failure = "step " + std::to_string(i) + ": " + name(report.status) + " after " +
                     std::to_string(report.iterations) + " iterations";

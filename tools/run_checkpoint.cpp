@@ -11,7 +11,7 @@
 namespace rhytid::tools {
 namespace {
 
-constexpr const char* format_name = "rhytid run state 1";
+constexpr const char* format_name = "rhytid run state 2";
 
 std::string bytes(const double* values, std::size_t count) {
   return {reinterpret_cast<const char*>(values), count * sizeof(double)};
@@ -27,12 +27,17 @@ std::string run_identity(const Scene& scene, const State& state) {
 }
 
 void write_checkpoint(const std::string& path, const RunCheckpoint& c) {
-  // A header line, then time, u, history and the carried numbers as raw doubles.
-  const nlohmann::ordered_json header = {{"format", format_name},       {"frame", c.frame},
-                                         {"u", c.state.u.size()},       {"history", c.state.history.size()},
-                                         {"carried", c.carried.size()}, {"identity", c.identity}};
+  // A header line, then time, u, velocity, history and the carried numbers as raw doubles.
+  const nlohmann::ordered_json header = {{"format", format_name},
+                                         {"frame", c.frame},
+                                         {"u", c.state.u.size()},
+                                         {"velocity", c.state.velocity.size()},
+                                         {"history", c.state.history.size()},
+                                         {"carried", c.carried.size()},
+                                         {"identity", c.identity}};
   write_file(path, header.dump() + "\n" + bytes(&c.state.time, 1) +
                        bytes(c.state.u.data(), c.state.u.size()) +
+                       bytes(c.state.velocity.data(), c.state.velocity.size()) +
                        bytes(c.state.history.data(), c.state.history.size()) +
                        bytes(c.carried.data(), c.carried.size()));
 }
@@ -43,17 +48,18 @@ std::optional<RunCheckpoint> read_checkpoint(const std::string& path, const std:
   const std::size_t end = content.find('\n');
   const auto header = nlohmann::json::parse(content.substr(0, end), nullptr, false);
   RunCheckpoint c;
-  std::size_t u = 0, history = 0, carried = 0;
+  std::size_t u = 0, velocity = 0, history = 0, carried = 0;
   try {
     if (header.at("format") != format_name) throw std::invalid_argument("format");
     c.frame = header.at("frame").get<int>();
     u = header.at("u").get<std::size_t>();
+    velocity = header.at("velocity").get<std::size_t>();
     history = header.at("history").get<std::size_t>();
     carried = header.at("carried").get<std::size_t>();
     c.identity = header.at("identity").get<std::string>();
     const std::size_t limit = content.size();  // no product below can then wrap around
-    if (u > limit || history > limit || carried > limit ||
-        content.size() - end - 1 != (1 + u + history + carried) * sizeof(double))
+    if (u > limit || velocity > limit || history > limit || carried > limit ||
+        content.size() - end - 1 != (1 + u + velocity + history + carried) * sizeof(double))
       throw std::invalid_argument("size");
   } catch (const std::exception&) {
     throw InputError(path, "a damaged file",
@@ -71,6 +77,8 @@ std::optional<RunCheckpoint> read_checkpoint(const std::string& path, const std:
   take(&c.state.time, 1);
   c.state.u.resize(static_cast<Eigen::Index>(u));
   take(c.state.u.data(), u);
+  c.state.velocity.resize(static_cast<Eigen::Index>(velocity));
+  take(c.state.velocity.data(), velocity);
   c.state.history.resize(static_cast<Eigen::Index>(history));
   take(c.state.history.data(), history);
   c.carried.resize(carried);

@@ -34,7 +34,7 @@ void Model::finish() {
 }
 
 State Model::rest_state() const {
-  return {0, VectorXd::Zero(3 * num_nodes()), VectorXd::Zero(static_cast<Eigen::Index>(history_size_))};
+  return {0, VectorXd::Zero(3 * num_nodes()), VectorXd::Zero(static_cast<Eigen::Index>(history_size_)), {}};
 }
 
 const NativeBlock& Model::native_block(const std::string& name) const {
@@ -155,6 +155,13 @@ void StepProblem::hessian(const VectorXd& q, Curvature curvature, BlockMatrix& o
   for (int i : model_->constraints.fixed_unknowns) out.fix(i);
 }
 
+VectorXd StepProblem::first_guess() {
+  const VectorXd held = model_->to_unknowns(old_->u);
+  if (old_->velocity.size() == 0) return held;
+  VectorXd moved = held + step_.dt() * model_->to_unknowns(old_->velocity);
+  return energy(moved, nullptr) < energy(held, nullptr) ? moved : held;
+}
+
 double StepProblem::largest_feasible_step(const VectorXd& q, const VectorXd& d) {
   const VectorXd u = model_->to_displacement(q), du = model_->to_displacement(d);
   double smallest = std::numeric_limits<double>::infinity();
@@ -163,7 +170,8 @@ double StepProblem::largest_feasible_step(const VectorXd& q, const VectorXd& d) 
 }
 
 State StepProblem::advance(const VectorXd& u) const {
-  State next{step_.t, u, VectorXd::Zero(static_cast<Eigen::Index>(model_->history_size()))};
+  State next{step_.t, u, VectorXd::Zero(static_cast<Eigen::Index>(model_->history_size())),
+             (u - old_->u) / step_.dt()};
   for (std::size_t k = 0; k < data_.size(); ++k)
     model_->terms[k].update(step_, data_[k], u, next.history.data() + model_->history_offset(k));
   return next;

@@ -88,6 +88,10 @@ class StepProblem final : public Objective {
   VectorXd residual(const VectorXd& u) const;
   /// Energy of each term at u, mJ.
   std::vector<double> term_energies(const VectorXd& u) const;
+  /// Where to start the minimiser: the old displacement, or that moved on by the old velocity if the energy
+  /// is lower there (on drags it halves the iterations; where a finger turns or stops, the energy refuses
+  /// it).
+  VectorXd first_guess();
   /// The state after the step, given its converged displacement.
   State advance(const VectorXd& u) const;
 

@@ -17,6 +17,18 @@ void RunOptions::validate() const {
   minimiser.validate();
 }
 
+MinimiserReport solve_step(StepProblem& problem, const State& old, const MinimiserOptions& options,
+                           CholeskyFactor& factor, BlockMatrix& matrix, VectorXd& q,
+                           const IterationCallback& callback) {
+  const VectorXd held = problem.model().to_unknowns(old.u);
+  q = problem.first_guess();
+  const bool moved = q != held;
+  MinimiserReport report = minimise(problem, q, options, factor, matrix, callback);
+  if (report.converged() || report.status == MinimiserStatus::interrupted || !moved) return report;
+  q = held;
+  return minimise(problem, q, options, factor, matrix, callback);
+}
+
 Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions& options,
                     const RunObserver& observer, const State* initial) {
   options.validate();
@@ -40,13 +52,13 @@ Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions
         const auto [target, depth] = pending.back();
         const StepInfo step{static_cast<int>(run.steps.size()), current.time, target};
         StepProblem problem(model, native, step, current);
-        VectorXd q = model.to_unknowns(current.u);
+        VectorXd q;
         IterationCallback callback;
         if (observer.iteration)
           callback = [&, t = target](int it, double e, double r) {
             return observer.iteration(frame, t, it, e, r);
           };
-        MinimiserReport report = minimise(problem, q, options.minimiser, factor, matrix, callback);
+        MinimiserReport report = solve_step(problem, current, options.minimiser, factor, matrix, q, callback);
         if (!report.converged()) {
           if (report.status != MinimiserStatus::interrupted && depth < options.max_bisections) {
             pending.back().second = depth + 1;

@@ -59,6 +59,13 @@ struct RunObserver {
       iteration;  ///< false = stop
 };
 
+/// Solves one step from problem.first_guess(), or once more from the old displacement if that does not
+/// converge. q is the solution if the report says converged, else where the minimiser stopped.
+[[nodiscard]] MinimiserReport solve_step(StepProblem& problem, const State& old,
+                                         const MinimiserOptions& options, CholeskyFactor& factor,
+                                         BlockMatrix& matrix, VectorXd& q,
+                                         const IterationCallback& callback = {});
+
 /// Runs from `initial` (rest when null). Step times are fixed by frame rate and substeps, plus bisections; a
 /// run continued from a state at frame `frames_done` has the step times, and so the bits, of the whole run.
 Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions& options,

@@ -11,6 +11,9 @@ struct State {
   double time = 0;   ///< s
   VectorXd u;        ///< [num_nodes·3] displacement, mm
   VectorXd history;  ///< [history_size]
+  /// [num_nodes·3] mean velocity of the step that led here, mm/s; empty at rest. Only the next step's first
+  /// guess reads it, no equation does, so the adjoint need not see it.
+  VectorXd velocity;
 };
 
 }  // namespace rhytid

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "sim/scene/load.h"
+#include "tests/support/paths.h"
 #include "tests/support/small_scenes.h"
 #include "tools/model_size.h"
 #include "tools/scene_review.h"
@@ -25,7 +26,7 @@ using testing::Not;
 /// Bundled scenes that need no file from elsewhere.
 std::vector<std::string> bundled_scenes() {
   std::vector<std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(RHYTID_SOURCE_DIR "/data/scenes")) {
+  for (const auto& entry : std::filesystem::directory_iterator(source_dir() + "/data/scenes")) {
     const auto file = entry.path() / "scene.json";
     const bool needs_head = entry.path().filename().string().starts_with("head_");
     if (!std::filesystem::exists(file) || needs_head) continue;
@@ -67,7 +68,7 @@ TEST(BundledScenes, head_rests_in_equilibrium) {
   if (!std::filesystem::exists(head)) GTEST_SKIP() << head << " does not exist";
   for (const std::string name : {"head_forehead", "head_fit"}) {
     const SceneModel scene_model(
-        load_scene(RHYTID_SOURCE_DIR "/data/scenes/" + name + "/scene.json", {"/skin/surface/file=" + head}));
+        load_scene(source_dir() + "/data/scenes/" + name + "/scene.json", {"/skin/surface/file=" + head}));
     const StepCost cost = measure_step_cost(scene_model);
     EXPECT_EQ(cost.rest_residual, 0) << name;
     if (name == "head_forehead") {

@@ -9,6 +9,7 @@
 
 #include "sim/core/error.h"
 #include "sim/element/quadrature.h"
+#include "tests/support/paths.h"
 #include "tools/rules/triangle_rule_search.h"
 
 namespace rhytid {
@@ -62,7 +63,7 @@ struct TableRule {
 };
 
 std::map<int, TableRule> read_table() {
-  std::ifstream file(RHYTID_SOURCE_DIR "/data/quadrature/triangle_rules.csv");
+  std::ifstream file(source_dir() + "/data/quadrature/triangle_rules.csv");
   std::map<int, TableRule> table;
   std::string line;
   std::getline(file, line);

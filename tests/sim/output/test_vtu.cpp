@@ -14,6 +14,7 @@
 #include "sim/output/vtu.h"
 #include "tests/sim/output/sample_mesh.h"
 #include "tests/sim/output/temporary_folder.h"
+#include "tests/support/paths.h"
 
 namespace rhytid {
 namespace {
@@ -29,7 +30,7 @@ struct VtkAnswer {
 };
 
 VtkAnswer ask_vtk(const std::string& file, const std::string& expected) {
-  const std::string command = std::string("/usr/bin/python3 ") + RHYTID_SOURCE_DIR +
+  const std::string command = std::string("/usr/bin/python3 ") + source_dir() +
                               "/tests/sim/output/vtk_readback.py " + file + " " + expected + " 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   if (!pipe) return {77, "cannot start python3"};
