@@ -1,4 +1,5 @@
-// Where the checkout is, for tests that read its data. One file knows it, so that checkouts share compiled objects.
+// Where the checkout is, for tests that read its data. One file knows it, so that checkouts share compiled
+// objects.
 #pragma once
 
 #include <string>
