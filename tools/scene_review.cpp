@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "sim/core/units.h"
+#include "sim/mesh/surface_edges.h"
 #include "sim/surface/heat_map.h"
 #include "sim/terms/contact_law.h"
 
@@ -142,6 +143,15 @@ void review_ligaments(const SceneModel& scene_model, std::vector<std::string>& w
 }
 
 }  // namespace
+
+SurfaceEdgeLengths surface_edge_lengths(const TriangleSurface& surface) {
+  std::vector<double> lengths;
+  for (const SurfaceEdge& edge : SurfaceEdges(surface.faces).edges)
+    lengths.push_back((surface.vertices.row(edge.first) - surface.vertices.row(edge.second)).norm());
+  std::sort(lengths.begin(), lengths.end());
+  return {lengths.front(), lengths[lengths.size() / 2], lengths.back(),
+          surface.vertices.colwise().maxCoeff() - surface.vertices.colwise().minCoeff()};
+}
 
 std::optional<WrinkleScale> wrinkle_scale(const SceneModel& scene_model) {
   const SkinScene& skin = scene_model.scene().skin;

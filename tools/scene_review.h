@@ -30,6 +30,13 @@ std::optional<WrinkleScale> wrinkle_scale(const SceneModel& scene_model);
 /// Nodes that a wrinkle needs to be resolved.
 inline constexpr double wanted_nodes_per_wavelength = 10;
 
+/// Sizes of the surface that is extruded, mm.
+struct SurfaceEdgeLengths {
+  double shortest = 0, median = 0, longest = 0;
+  Vec3 box = Vec3::Zero();
+};
+SurfaceEdgeLengths surface_edge_lengths(const TriangleSurface& surface);
+
 /// One sentence per doubt that only the built model can raise; scene_warnings covers the file itself.
 std::vector<std::string> review_scene(const SceneModel& scene_model, const StepCost& cost);
 

@@ -46,6 +46,7 @@ struct Findings {
   StepCost cost;
   MemoryEstimate memory;
   std::optional<WrinkleScale> wrinkles;
+  SurfaceEdgeLengths edges;
   std::vector<std::string> warnings;
 
   explicit Findings(const SceneModel& built)
@@ -54,6 +55,7 @@ struct Findings {
         cost(measure_step_cost(built)),
         memory(memory_estimate(built, size, cost.factor_entries)),
         wrinkles(wrinkle_scale(built)),
+        edges(surface_edge_lengths(built.model().mesh.surface)),
         warnings(scene_warnings(built.scene())) {
     const std::vector<std::string> more = review_scene(built, cost);
     warnings.insert(warnings.end(), more.begin(), more.end());
@@ -67,6 +69,12 @@ struct Findings {
 ordered_json to_json(const Findings& f) {
   const Scene& scene = f.scene_model.scene();
   ordered_json j = {{"scene", scene.name}, {"file", scene.file}};
+  const TriangleSurface& surface = f.scene_model.model().mesh.surface;
+  if (!surface.format.empty()) {
+    j["surface"] = {{"file", surface.origin}, {"format", surface.format}, {"notes", surface.notes}};
+  }
+  j["surface"]["edges_mm"] = {f.edges.shortest, f.edges.median, f.edges.longest};
+  j["surface"]["box_mm"] = {f.edges.box[0], f.edges.box[1], f.edges.box[2]};
   j["sizes"] = {{"faces", f.size.faces},
                 {"columns", f.size.columns},
                 {"levels", f.size.levels},
@@ -147,6 +155,19 @@ void print(const Findings& f, std::ostream& out) {
   Lines lines(out);
   out << scene.name << " (" << scene.file << ") is valid\n";
   if (!scene.description.empty()) out << scene.description << '\n';
+
+  lines.heading("Surface");
+  const TriangleSurface& surface = f.scene_model.model().mesh.surface;
+  if (!surface.format.empty()) {
+    lines.row("file", surface.origin + ", " + surface.format);
+    for (std::size_t k = 0; k < surface.notes.size(); ++k) lines.row(k ? "" : "read", surface.notes[k]);
+    const double scale = scene.skin.surface.mm_per_unit;
+    lines.row("unit", scale > 0 ? number_text(scale, "%.6g mm") : "not given: mm");
+  }
+  lines.row("box", number_text(f.edges.box[0], "%.4g x ") + number_text(f.edges.box[1], "%.4g x ") +
+                       number_text(f.edges.box[2], "%.4g mm"));
+  lines.row("edges", number_text(f.edges.shortest) + " to " + number_text(f.edges.longest) + " mm, median " +
+                         number_text(f.edges.median) + " mm");
 
   lines.heading("Sizes");
   lines.row("faces", std::to_string(f.size.faces) + ", " + std::to_string(f.size.elements) + " elements");

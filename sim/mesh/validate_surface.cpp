@@ -59,9 +59,18 @@ class Validator {
   void check_scale() const {
     const double diagonal =
         (surface_.vertices.colwise().maxCoeff() - surface_.vertices.colwise().minCoeff()).norm();
-    if (diagonal < 1 || diagonal > 1000)
-      fail("its box has a diagonal of " + format_mm(diagonal) +
-           ", expected 1 to 1000 mm; is mm_per_unit right (10 for cm, 1000 for m)?");
+    if (diagonal >= 1 && diagonal <= 1000) return;
+    const std::string found =
+        "its box has a diagonal of " + format_mm(diagonal) + ", expected 1 to 1000 mm; ";
+    // Mixed-up units of a head, whose box has a diagonal of about 450 mm.
+    for (const double factor : {1e-1, 1e-2, 1e-3, 1e1, 1e2, 1e3})
+      if (factor * diagonal > 150 && factor * diagonal < 1000) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%g", factor);
+        fail(found + "mm_per_unit times " + text + " would make it " + format_mm(factor * diagonal) +
+             ", the size of a head");
+      }
+    fail(found + "is mm_per_unit right (10 for cm, 1000 for m)?");
   }
 
   void check_shapes() const {

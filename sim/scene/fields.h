@@ -33,9 +33,22 @@ void fields(Archive& archive, T& surface) {
     archive("file", surface.file);
     archive.scale("mm_per_unit", "unit", surface.mm_per_unit);
   }
-  archive.group("crop", surface.crop_centre.has_value(), [&surface](auto& crop) {
-    crop("centre", surface.crop_centre);
-    crop("radius", surface.crop_radius);
+  if (archive.has("coincident", !surface.file.empty())) archive("coincident", surface.coincident);
+  const bool is_cropped = surface.crop_centre || surface.crop_low || !surface.crop_vertices.empty() ||
+                          !surface.crop_vertices_file.empty();
+  archive.group("crop", is_cropped, [&surface](auto& crop) {
+    if (crop.has("centre", surface.crop_centre.has_value())) {
+      crop("centre", surface.crop_centre);
+      crop("radius", surface.crop_radius);
+      crop("by", surface.crop_by);
+    }
+    crop.group("box", surface.crop_low.has_value(), [&surface](auto& box) {
+      box("low", surface.crop_low);
+      box("high", surface.crop_high);
+    });
+    if (crop.has("vertices", !surface.crop_vertices.empty())) crop("vertices", surface.crop_vertices);
+    if (crop.has("vertices_file", !surface.crop_vertices_file.empty()))
+      crop("vertices_file", surface.crop_vertices_file);
   });
   archive.flag("side", "outer", "inner", surface.is_outer);
   archive.group("grid", surface.file.empty(), [&surface](auto& grid) {

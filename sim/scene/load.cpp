@@ -40,7 +40,8 @@ class Reader {
     member = source_.at(key) == word;
   }
   void scale(const char* key, const char* unit_key, double& member) {
-    member = source_.contains(unit_key) ? mm_per(source_.at(unit_key)) : source_.at(key).get<double>();
+    if (source_.contains(unit_key)) member = mm_per(source_.at(unit_key));
+    if (source_.contains(key)) member = source_.at(key).get<double>();
   }
 
  private:
@@ -102,7 +103,9 @@ class Writer {
   void flag(const char* key, const char* yes, const char* no, bool member) {
     target_[key] = member ? yes : no;
   }
-  void scale(const char* key, const char*, double member) { target_[key] = member; }
+  void scale(const char* key, const char*, double member) {
+    if (member > 0) target_[key] = member;
+  }
 
   const json& result() const { return target_; }
 

@@ -112,7 +112,9 @@ std::string expectation(const Rule& rule) {
     case RuleType::object:
       return "an object {...}";
     case RuleType::array:
-      return rule.min > 0 ? "a list of at least " + number_text(rule.min) + " item" : "a list [...]";
+      return rule.min > 0
+                 ? "a list of at least " + number_text(rule.min) + (rule.min == 1 ? " item" : " items")
+                 : "a list [...]";
     case RuleType::number:
       if (is_plain) return "a number" + range;
       return dimension_text(rule.dimension) + range + ", e.g. \"" + dimension_example(rule.dimension) + "\"";

@@ -30,12 +30,17 @@ struct LayerScene {
 
 struct SurfaceScene {
   // Exactly one of file or grid.
-  std::string file;  ///< resolved path, empty when a grid
-  double mm_per_unit = 1;
-  std::optional<Vec3> crop_centre;        ///< mm
-  double crop_radius = 0;                 ///< mm, geodesic
-  bool is_outer = true;                   ///< the surface is the outer skin (else the inner face)
-  std::array<double, 2> grid_size{0, 0};  ///< mm
+  std::string file;                  ///< resolved path, empty when a grid
+  double mm_per_unit = 0;            ///< 0 = not given: 1, refused when the file's size makes that doubtful
+  std::string coincident = "auto";   ///< auto | join | keep: vertices at exactly the same place
+  std::optional<Vec3> crop_centre;   ///< mm
+  double crop_radius = 0;            ///< mm
+  std::string crop_by = "geodesic";  ///< geodesic | distance: how crop_radius is measured
+  std::optional<Vec3> crop_low, crop_high;  ///< mm, corners of a box
+  std::vector<int> crop_vertices;           ///< indices in the mesh file, from 0
+  std::string crop_vertices_file;           ///< the same in a text file
+  bool is_outer = true;                     ///< the surface is the outer skin (else the inner face)
+  std::array<double, 2> grid_size{0, 0};    ///< mm
   std::array<int, 2> grid_cells{0, 0};
   std::string grid_pattern = "union_jack";
   double bend_radius = 0;  ///< mm, 0 = flat

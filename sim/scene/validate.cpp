@@ -205,6 +205,25 @@ void require_direction(const LocatedJson& scene, const json& holder, const std::
                      "a vector that is not zero");
 }
 
+void check_crop(const LocatedJson& scene) {
+  const std::string at = "/skin/surface/crop";
+  const json& surface = scene.json["skin"]["surface"];
+  if (!surface.contains("crop")) return;
+  const json& crop = surface["crop"];
+  std::string given;
+  int count = 0;
+  for (const char* key : {"centre", "box", "vertices", "vertices_file"})
+    if (crop.contains(key)) given += (count++ ? ", \"" : "\"") + std::string(key) + "\"";
+  if (count != 1)
+    throw InputError(scene.where(at) + ": " + at, count == 0 ? "none of them" : given,
+                     "exactly one of \"centre\", \"box\", \"vertices\" and \"vertices_file\"");
+  for (size_t axis = 0; crop.contains("box") && axis < 3; ++axis)
+    if (crop["box"]["low"][axis] >= crop["box"]["high"][axis])
+      throw InputError(scene.where(at + "/box") + ": " + at + "/box",
+                       shown_json(crop["box"]["low"]) + " and " + shown_json(crop["box"]["high"]),
+                       "low below high in every coordinate");
+}
+
 }  // namespace
 
 LocatedJson resolve_against_rules(const LocatedJson& scene, const RuleNode& rules) {
@@ -215,6 +234,7 @@ LocatedJson resolve_against_rules(const LocatedJson& scene, const RuleNode& rule
 void check_consistency(const LocatedJson& scene) {
   const json& root = scene.json;
   require_unique_names(scene, root["skin"]["layers"], "/skin/layers");
+  check_crop(scene);
   if (root.contains("ligaments"))
     require_unique_names(scene, root["ligaments"]["sources"], "/ligaments/sources");
   require_unique_names(scene, root["colliders"], "/colliders");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sim/scene/scene_surface.h"
 #include "sim/terms/geometry.h"
 #include "sim/terms/skin_law.h"
 
@@ -23,24 +24,10 @@ double relaxing_part(const Scene& scene, const LayerScene& l) {
   return scene.time.damper == DamperScheme::none ? 0 : l.relaxing_fraction;
 }
 
-GridPattern grid_pattern(const std::string& name) {
-  if (name == "diagonal_plus") return GridPattern::diagonal_plus;
-  if (name == "diagonal_minus") return GridPattern::diagonal_minus;
-  return GridPattern::union_jack;
-}
-
 }  // namespace
 
 SkinMesh build_skin_mesh(const SkinScene& skin) {
-  TriangleSurface surface;
-  if (!skin.surface.file.empty()) {
-    surface = read_obj(skin.surface.file, skin.surface.mm_per_unit);
-    if (skin.surface.crop_centre)
-      surface = crop_geodesic_disc(surface, *skin.surface.crop_centre, skin.surface.crop_radius);
-  } else {
-    surface = grid_surface(skin.surface.grid_size[0], skin.surface.grid_size[1], skin.surface.grid_cells[0],
-                           skin.surface.grid_cells[1], grid_pattern(skin.surface.grid_pattern));
-  }
+  const TriangleSurface surface = scene_surface(skin.surface);
   ExtrusionOptions options;
   options.order = skin.order;
   for (const LayerScene& l : skin.layers) options.layers.push_back({l.thickness, l.elements, l.order});

@@ -107,6 +107,12 @@ TEST(SceneSchema, PairsAndDependenciesAgree) {
            R"({})",
            R"({"file": "a.obj", "crop": {"centre": [0, 0, 0], "radius": 9}})",
            R"({"file": "a.obj", "crop": {"centre": [0, 0, 0]}})",
+           R"({"file": "a.obj", "crop": {"box": {"low": [0, 0, 0], "high": [1, 2, 3]}}})",
+           R"({"file": "a.obj", "crop": {"box": {"low": [0, 0, 0]}}})",
+           R"({"file": "a.obj", "coincident": "join", "crop": {"vertices": [4, 8, 9]}})",
+           R"({"file": "a.obj", "crop": {"vertices": [4, -8, 9]}})",
+           R"({"file": "a.obj", "crop": {"vertices": [4, 8]}})",
+           R"({"file": "a.obj", "crop": {"vertices_file": "list.txt"}})",
            R"({"grid": {"size": [1, 1], "cells": [1, 1]}, "crop": {"centre": [0, 0, 0], "radius": 9}})",
            R"({"grid": {"size": [1, 1], "cells": [1, 1]}, "file": "a.obj"})",
        }) {
