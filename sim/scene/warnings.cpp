@@ -68,7 +68,7 @@ void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
   if (time.frames > 0 && collider.path.front().time > end)
     warnings.push_back(sentence(at, "/path: starts at ", time_text(collider.path.front().time),
                                 ", after the last frame at ", time_text(end), ", so that it never moves"));
-  if (!collider.friction || collider.shape != ShapeKind::sphere) return;
+  if (collider.shape != ShapeKind::sphere) return;
   // Lagged friction is only good while the contact moves by less than a quarter of its radius in a step, and
   // the contact is smaller than the sphere.
   double fastest = 0;
@@ -78,10 +78,15 @@ void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
     const double distance = (b.position - a.position).norm();
     fastest = std::max(fastest, distance * std::min(1., step / (b.time - a.time)));
   }
-  if (fastest > collider.radius / 4)
+  if (fastest > 2 * collider.radius) {
+    warnings.push_back(sentence(at, "/path: moves ", length_text(fastest),
+                                " in one step, more than its diameter, so that it may pass through the skin "
+                                "between two steps; raise /time/substeps"));
+  } else if (collider.friction && fastest > collider.radius / 4) {
     warnings.push_back(sentence(
         at, "/path: moves ", length_text(fastest), " in one step, more than a quarter of its radius ",
         length_text(collider.radius), ", so that lagged friction is inaccurate; raise /time/substeps"));
+  }
 }
 
 }  // namespace

@@ -37,6 +37,14 @@ State Model::rest_state() const {
   return {0, VectorXd::Zero(3 * num_nodes()), VectorXd::Zero(static_cast<Eigen::Index>(history_size_)), {}};
 }
 
+std::vector<int> Model::penalties() const {
+  std::vector<int> indices;
+  for (const NativeBlock& block : native_blocks)
+    if (block.name == "base" || block.name.rfind("collider/", 0) == 0)
+      indices.insert(indices.end(), block.stiffness_like.begin(), block.stiffness_like.end());
+  return indices;
+}
+
 const NativeBlock& Model::native_block(const std::string& name) const {
   for (const NativeBlock& block : native_blocks)
     if (block.name == name) return block;

@@ -52,6 +52,8 @@ class Model {
   std::size_t history_offset(std::size_t term) const { return history_offsets_[term]; }
   /// The rest state: zero displacement, C^v = I, no lagged pressure.
   State rest_state() const;
+  /// Native parameters that are contact penalties κ.
+  std::vector<int> penalties() const;
   const NativeBlock& native_block(const std::string& name) const;  ///< throws ContractError when absent
 
   /// Unknowns from displacements and back (a gradient maps like a displacement; fixed components read as

@@ -59,12 +59,25 @@ Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions
             return observer.iteration(frame, t, it, e, r);
           };
         MinimiserReport report = solve_step(problem, current, options.minimiser, factor, matrix, q, callback);
+        bool softened = false;
         if (!report.converged()) {
           if (report.status != MinimiserStatus::interrupted && depth < options.max_bisections) {
             pending.back().second = depth + 1;
             pending.emplace_back(0.5 * (current.time + target), depth + 1);
             continue;
           }
+          if (report.status != MinimiserStatus::interrupted) {
+            VectorXd q_softened;
+            MinimiserReport last =
+                solve_step_softened(problem, options.minimiser, factor, matrix, q_softened, callback);
+            softened = last.converged();
+            if (softened || last.status == MinimiserStatus::interrupted) {
+              report = std::move(last);
+              q = std::move(q_softened);
+            }
+          }
+        }
+        if (!report.converged()) {
           char text[256];
           std::snprintf(text, sizeof text,
                         "frame %d, t = %.6g s: %s after %d iterations and %d bisections (residual %.3g N, "
@@ -77,7 +90,7 @@ Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions
         }
         pending.pop_back();
         State next = problem.advance(model.to_displacement(q));
-        StepRecord record{step, frame, depth, {}, std::move(report)};
+        StepRecord record{step, frame, depth, softened, {}, std::move(report)};
         const bool frame_done = pending.empty() && sub == options.substeps;
         if (observer.step) observer.step({problem, next, record, frame_done});
         current = std::move(next);

@@ -24,9 +24,10 @@ struct RunOptions {
 /// One converged step.
 struct StepRecord {
   StepInfo step;
-  int frame = 0;       ///< frame the step leads to (1-based; frame 0 is rest)
-  int bisections = 0;  ///< how often the nominal step was halved
-  State state;         ///< after the step (empty when states are not kept)
+  int frame = 0;          ///< frame the step leads to (1-based; frame 0 is rest)
+  int bisections = 0;     ///< how often the nominal step was halved
+  bool softened = false;  ///< its start came from softened penalties (the equations solved are the scene's)
+  State state;            ///< after the step (empty when states are not kept)
   MinimiserReport report;
 };
 
@@ -66,6 +67,15 @@ struct RunObserver {
                                          BlockMatrix& matrix, VectorXd& q,
                                          const IterationCallback& callback = {});
 
+/// The last rung of the ladder: the step with all contact penalties softened to at most 1e-6 of the stiffest
+/// and back in steps of ten, each start from the solution before it, to a loose tolerance; then the step
+/// itself from there. Not converged without contacts. q and report as of solve_step.
+[[nodiscard]] MinimiserReport solve_step_softened(StepProblem& problem, const MinimiserOptions& options,
+                                                  CholeskyFactor& factor, BlockMatrix& matrix, VectorXd& q,
+                                                  const IterationCallback& callback = {});
+
+/// A step that fails is halved, at most max_bisections times; then it is tried with softened penalties; then
+/// the run ends with a report, and all states before it are kept.
 /// Runs from `initial` (rest when null). Step times are fixed by frame rate and substeps, plus bisections; a
 /// run continued from a state at frame `frames_done` has the step times, and so the bits, of the whole run.
 Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions& options,

@@ -1,0 +1,31 @@
+// What `rhytid bench` runs: one benchmark per subcommand. A new one is a class in tools/bench and a line in
+// benchmarks.cpp; options of its own, files and exit codes work as in a verb.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+
+struct BenchmarkHelp {
+  std::string name;         ///< the subcommand
+  std::string summary;      ///< a line for the list
+  std::string description;  ///< a paragraph: what is measured, what it shows
+};
+
+class Benchmark {
+ public:
+  virtual ~Benchmark() = default;
+  virtual BenchmarkHelp help() const = 0;
+  virtual void add_options(CLI::App&) {}
+  /// Writes tables into `folder` (exists) and a short account to context.out.
+  virtual ExitCode run(VerbContext& context, const std::string& folder) = 0;
+};
+
+/// All benchmarks, in the order of the help.
+std::vector<std::unique_ptr<Benchmark>> make_benchmarks();
+
+}  // namespace rhytid::tools

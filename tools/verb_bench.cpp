@@ -1,0 +1,58 @@
+// rhytid bench: benchmarks of the simulator, one per subcommand (tools/bench).
+#include <CLI/CLI.hpp>
+
+#include "sim/core/error.h"
+#include "tools/bench/benchmark.h"
+
+namespace rhytid::tools {
+namespace {
+
+class Bench : public Verb {
+ public:
+  VerbHelp help() const override {
+    return {
+        "bench",
+        "benchmarks of the simulator: tables of stability",
+        "Runs one benchmark on scenes of its own and writes its tables. `stability` takes every setting to "
+        "its extremes on a small scene.",
+        "nothing",
+        "tables (CSV, Markdown) into -o DIR, and a short account on stdout",
+        "rhytid bench stability --quick -o run/stability"};
+  }
+  bool takes_file() const override { return false; }
+
+  void add_options(CLI::App& app) override {
+    app.require_subcommand(1);
+    app.fallthrough();
+    app.add_option("-o,--output", output_, "folder for results (default run/bench_<name>)")
+        ->option_text("DIR");
+    for (const auto& benchmark : benchmarks_) {
+      const BenchmarkHelp text = benchmark->help();
+      CLI::App* sub = app.add_subcommand(text.name, text.summary);
+      sub->footer(text.description);
+      sub->fallthrough();
+      benchmark->add_options(*sub);
+      sub->callback([this, chosen = benchmark.get()] { chosen_ = chosen; });
+    }
+  }
+
+  ExitCode run(VerbContext& context) override {
+    CommonOptions options = context.options;
+    options.output = output_.empty() ? "run/bench_" + chosen_->help().name : output_;
+    VerbContext own{options, context.program, context.progress, context.out};
+    return chosen_->run(own, own.output_folder());
+  }
+
+ private:
+  std::vector<std::unique_ptr<Benchmark>> benchmarks_ = make_benchmarks();
+  Benchmark* chosen_ = nullptr;
+  std::string output_;
+};
+
+}  // namespace
+
+std::unique_ptr<Verb> make_verb_bench() {
+  return std::make_unique<Bench>();
+}
+
+}  // namespace rhytid::tools
