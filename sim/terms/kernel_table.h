@@ -80,9 +80,15 @@ constexpr KernelTable kernel_table() {
 /// Prism kernels of viscoelastic and elastic skin for the best instruction set of this machine.
 const KernelTable& skin_kernels();
 const KernelTable& elastic_skin_kernels();
+/// The same for PreStretchedLaw of those laws.
+const KernelTable& pre_stretched_skin_kernels();
+const KernelTable& pre_stretched_elastic_skin_kernels();
+/// Prism kernels of the volumetric term alone.
+const KernelTable& volume_kernels();
 /// Name of the instruction set those use: "avx2" or "baseline".
 const char* skin_kernel_isa();
 const KernelTable& ligament_kernels();
+const KernelTable& fung_ligament_kernels();
 const KernelTable& contact_kernels();
 const KernelTable& friction_kernels();
 

@@ -8,10 +8,18 @@
 
 namespace rhytid {
 
-extern const KernelTable skin_table_baseline, elastic_table_baseline;
 #ifdef RHYTID_HAVE_AVX2
-extern const KernelTable skin_table_avx2, elastic_table_avx2;
+#define RHYTID_TABLES(name) extern const KernelTable name##_table_baseline, name##_table_avx2;
+#define RHYTID_CHOSEN(name) use_avx2() ? name##_table_avx2 : name##_table_baseline
+#else
+#define RHYTID_TABLES(name) extern const KernelTable name##_table_baseline;
+#define RHYTID_CHOSEN(name) name##_table_baseline
 #endif
+RHYTID_TABLES(skin)
+RHYTID_TABLES(elastic)
+RHYTID_TABLES(volume)
+RHYTID_TABLES(pre_stretched_skin)
+RHYTID_TABLES(pre_stretched_elastic)
 
 namespace {
 
@@ -31,27 +39,31 @@ bool use_avx2() {
 
 }  // namespace
 
-#ifdef RHYTID_HAVE_AVX2
 const KernelTable& skin_kernels() {
-  return use_avx2() ? skin_table_avx2 : skin_table_baseline;
+  return RHYTID_CHOSEN(skin);
 }
 const KernelTable& elastic_skin_kernels() {
-  return use_avx2() ? elastic_table_avx2 : elastic_table_baseline;
+  return RHYTID_CHOSEN(elastic);
 }
-#else
-const KernelTable& skin_kernels() {
-  return skin_table_baseline;
+const KernelTable& volume_kernels() {
+  return RHYTID_CHOSEN(volume);
 }
-const KernelTable& elastic_skin_kernels() {
-  return elastic_table_baseline;
+const KernelTable& pre_stretched_skin_kernels() {
+  return RHYTID_CHOSEN(pre_stretched_skin);
 }
-#endif
+const KernelTable& pre_stretched_elastic_skin_kernels() {
+  return RHYTID_CHOSEN(pre_stretched_elastic);
+}
 const char* skin_kernel_isa() {
   return use_avx2() ? "avx2" : "baseline";
 }
 
 const KernelTable& ligament_kernels() {
   static constexpr KernelTable table = kernel_table<LigamentLaw, SurfaceKinematics>();
+  return table;
+}
+const KernelTable& fung_ligament_kernels() {
+  static constexpr KernelTable table = kernel_table<FungLigamentLaw, SurfaceKinematics>();
   return table;
 }
 const KernelTable& contact_kernels() {

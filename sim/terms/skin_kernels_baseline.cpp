@@ -1,4 +1,3 @@
 // Skin kernels for any machine of the platform.
-#define RHYTID_SKIN_TABLE skin_table_baseline
-#define RHYTID_ELASTIC_TABLE elastic_table_baseline
+#define RHYTID_SKIN_TABLE(name) name##_table_baseline
 #include "sim/terms/skin_kernels.inc"

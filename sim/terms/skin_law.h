@@ -45,16 +45,16 @@ T half_log_deviator(const T* y, T* e) {
   return e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + 2.0 * (e[3] * e[3] + e[4] * e[4] + e[5] * e[5]);
 }
 
-/// The equilibrium part: energy and N with S = N C⁻¹, N symmetric and coaxial with C.
+/// The equilibrium part: energy and N with S = N C⁻¹, N symmetric and coaxial with C. `volume` scales K.
 template <class T>
-T equilibrium(const T* y, const T* theta, T* n) {
+T equilibrium(const T* y, const T* theta, double volume, T* n) {
   using std::exp;
   using std::expm1;
   using std::log1p;
   const T q = half_log_deviator(y, n);
   const T& mu = theta[SkinTheta::mu_inf];
   const T& stiffening = theta[SkinTheta::stiffening];
-  const T& bulk = theta[SkinTheta::bulk];
+  const T bulk = volume * theta[SkinTheta::bulk];
   const T z = stiffening * q;
   const T factor = 2.0 * mu * exp(z);
   const T jm1 = expm1(0.5 * log1p(det_minus_one(y)));  // J − 1
@@ -89,6 +89,7 @@ struct SkinLaw {
   static constexpr int ne = 6, ns = 6, np = 6, ntheta = 5, nrest = 0;
   static constexpr const char* name = "skin";
   DamperScheme scheme = DamperScheme::exponential;
+  double volume = 1;  ///< 0 when a VolumeLaw at points of its own carries K
 
   template <class T>
   void prepare(const T* y_old, const T* history, const T* theta, const double*, double dt,
@@ -107,7 +108,7 @@ struct SkinLaw {
   template <class T>
   T stress(const T* y, const T* prepared, const T* theta, const double*, double dt, T* sigma) const {
     T n[6], l[6], m[6], difference[6], x[6], ee[6];
-    T psi = equilibrium(y, theta, n);
+    T psi = equilibrium(y, theta, volume, n);
     cholesky_one_plus(prepared, l);
     invert_lower(l, m);
     for (int c = 0; c < 6; ++c) difference[c] = y[c] - prepared[c];
@@ -148,17 +149,40 @@ struct SkinLaw {
 struct ElasticSkinLaw {
   static constexpr int ne = 6, ns = 0, np = 0, ntheta = 3, nrest = 0;
   static constexpr const char* name = "skin";
+  double volume = 1;  ///< as in SkinLaw
 
   template <class T>
   void prepare(const T*, const T*, const T*, const double*, double, T*) const {}
   template <class T>
   T stress(const T* y, const T*, const T* theta, const double*, double, T* sigma) const {
     T n[6], a[3][3];
-    const T psi = equilibrium(y, theta, n);
+    const T psi = equilibrium(y, theta, volume, n);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) a[i][j] = n[kSym[i][j]];
     stress_from(a, y, sigma);
     return psi;
+  }
+  template <class T>
+  void update(const T*, const T*, const T*, const double*, double, T*) const {}
+};
+
+/// The volumetric term alone, for points of its own (fewer through the thickness): ψ = K/2 (J − 1)². θ = K.
+struct VolumeLaw {
+  static constexpr int ne = 6, ns = 0, np = 0, ntheta = 1, nrest = 0;
+  static constexpr const char* name = "volume";
+
+  template <class T>
+  void prepare(const T*, const T*, const T*, const double*, double, T*) const {}
+  template <class T>
+  T stress(const T* y, const T*, const T* theta, const double*, double, T* sigma) const {
+    using std::expm1;
+    using std::log1p;
+    const T jm1 = expm1(0.5 * log1p(det_minus_one(y)));
+    const T half_pressure = 0.5 * theta[0] * jm1 * (jm1 + 1.0);
+    T inverse[6];
+    inverse_one_plus(y, inverse);
+    for (int c = 0; c < 6; ++c) sigma[c] = (c < 3 ? 1.0 : 2.0) * half_pressure * inverse[c];
+    return 0.5 * theta[0] * jm1 * jm1;
   }
   template <class T>
   void update(const T*, const T*, const T*, const double*, double, T*) const {}

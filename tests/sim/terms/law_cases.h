@@ -15,6 +15,7 @@
 #include "sim/terms/contact_law.h"
 #include "sim/terms/kinematics.h"
 #include "sim/terms/ligament_law.h"
+#include "sim/terms/pre_stretch_law.h"
 #include "sim/terms/skin_law.h"
 
 namespace rhytid::test {
@@ -95,9 +96,49 @@ inline std::vector<LawCase<ElasticSkinLaw>> elastic_cases() {
   return {c};
 }
 
-inline std::vector<LawCase<LigamentLaw>> ligament_cases() {
+inline std::vector<LawCase<VolumeLaw>> volume_cases() {
+  Rng rng(16);
+  LawCase<VolumeLaw> c{"volume", {}, {}};
+  for (double amount : {0.3, 0.1, 0.01}) {
+    LawState s;
+    s.e_old = s.e = random_strain(rng, amount);
+    s.history = VectorXd::Zero(0);
+    s.theta = s.theta_scale = VectorXd::Constant(1, 30);
+    s.rest = VectorXd::Zero(1);
+    s.step = 0.02;
+    c.states.push_back(s);
+  }
+  return {c};
+}
+
+/// The same states as `cases`, under tension λ₁ = 1.1, λ₂ = 0.95 or almost none, in a random frame.
+template <class Law>
+std::vector<LawCase<PreStretchedLaw<Law>>> pre_stretched(const std::vector<LawCase<Law>>& cases) {
+  Rng rng(17);
+  std::vector<LawCase<PreStretchedLaw<Law>>> result;
+  for (const LawCase<Law>& c : cases) {
+    LawCase<PreStretchedLaw<Law>> p{"pre-stretched " + c.name, {c.law}, c.states};
+    for (std::size_t k = 0; k < p.states.size(); ++k) {
+      LawState& s = p.states[k];
+      const Vec3 n = Vec3(uniform(rng, 3)).normalized(), t = n.unitOrthogonal();
+      s.rest = VectorXd(6);
+      s.rest << t, n;
+      VectorXd theta(s.theta.size() + 2), scale(theta.size());
+      theta << s.theta, k % 2 ? 1.1 : 1 + 1e-9, k % 2 ? 0.95 : 1;
+      scale << s.theta_scale, 0.2, 0.2;
+      s.theta = theta;
+      s.theta_scale = scale;
+    }
+    result.push_back(p);
+  }
+  return result;
+}
+
+/// For either law: k, ε, b. A Fung exponent is b d², so it reaches the continuation earlier.
+template <class Law>
+std::vector<LawCase<Law>> ligament_cases() {
   Rng rng(13);
-  LawCase<LigamentLaw> c{"ligament", {}, {}};
+  LawCase<Law> c{Law::name, {}, {}};
   // |u| from far below ε to far beyond, and past the continuation at b s = 50.
   for (double size : {1e-3, 0.05, 0.5, 3.0, 9.0})
     for (double b : {0.3, 4.0, 10.0}) {
@@ -108,7 +149,7 @@ inline std::vector<LawCase<LigamentLaw>> ligament_cases() {
       s.theta = Vec3(5e-4, 0.02, b);
       s.theta_scale = s.theta;
       s.rest = VectorXd::Zero(1);
-      s.step = std::min(0.1 * std::max(size, 0.02), 0.1 / b);
+      s.step = std::min(0.1 * std::max(size, 0.02), 0.1 / (b * std::max(size, 1.0)));
       c.states.push_back(s);
     }
   return {c};

@@ -115,8 +115,20 @@ TEST(LawProperties, Skin) {
 TEST(LawProperties, ElasticSkin) {
   check_law(elastic_cases());
 }
+TEST(LawProperties, Volume) {
+  check_law(volume_cases());
+}
+TEST(LawProperties, PreStretchedSkin) {
+  check_law(pre_stretched(skin_cases()));
+}
+TEST(LawProperties, PreStretchedElasticSkin) {
+  check_law(pre_stretched(elastic_cases()));
+}
 TEST(LawProperties, Ligament) {
-  check_law(ligament_cases());
+  check_law(ligament_cases<LigamentLaw>());
+}
+TEST(LawProperties, FungLigament) {
+  check_law(ligament_cases<FungLigamentLaw>());
 }
 TEST(LawProperties, Contact) {
   const auto choices = shapes();

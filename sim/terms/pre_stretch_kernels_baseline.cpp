@@ -1,0 +1,3 @@
+// Pre-stretched skin kernels for any machine of the platform.
+#define RHYTID_SKIN_TABLE(name) name##_table_baseline
+#include "sim/terms/pre_stretch_kernels.inc"
