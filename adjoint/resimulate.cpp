@@ -11,6 +11,7 @@ Trajectory resimulate(const Model& model, const VectorXd& native, const Trajecto
   Trajectory run;
   run.initial = reference.initial;
   State current = run.initial;
+  if (!reference.steps.empty()) current.time = reference.steps.front().step.t_old;
   BlockMatrix matrix(model.pattern());
   CholeskyFactor factor(model.pattern());
   for (int i = 0; i < static_cast<int>(reference.steps.size()); ++i) {

@@ -60,11 +60,12 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
     }
     result.frames.push_back(std::move(out));
   };
-  record_frame(0, run.initial);
+  const bool starts_at_rest = run.frame_end.front() == 0;  // else a settling step leads to frame 0
+  if (starts_at_rest) record_frame(0, run.initial);
 
   BlockMatrix matrix(model.pattern());
   CholeskyFactor factor(model.pattern());
-  int frame = 1;
+  int frame = starts_at_rest ? 1 : 0;
   for (int i = 0; i < static_cast<int>(run.steps.size()); ++i) {
     const StepRecord& record = run.steps[i];
     const State& old = run.before(i);
@@ -115,7 +116,7 @@ AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Tr
   for (int i = static_cast<int>(run.steps.size()) - 1; i >= 0; --i) {
     const StepRecord& record = run.steps[i];
     const State& old = run.before(i);
-    for (; frame > 0 && run.frame_end[frame] == i + 1; --frame)
+    for (; frame >= 0 && run.frame_end[frame] == i + 1; --frame)
       if (output.size(frame) > 0) output.adjoint(frame, record.state, weights[frame], u_bar, s_bar);
     StepProblem problem(model, native, record.step, old);
     VectorXd residual;

@@ -84,14 +84,14 @@ double FunctionalDifference::frame_difference(int frame, const State& state) con
 
 double FunctionalDifference::difference(const Trajectory& other) const {
   double sum = 0;
-  for (int f = 1; f <= run_->frames(); ++f) sum += frame_difference(f, other.at_frame(f));
+  for (int f = 0; f <= run_->frames(); ++f) sum += frame_difference(f, other.at_frame(f));
   return sum;
 }
 
 FunctionalDifference::Result FunctionalDifference::evaluate(const VectorXd& native, const StartGuess& guess,
                                                             const std::function<bool()>& go_on) const {
   Result result;
-  int frame = 1;
+  int frame = run_->frame_end.front() == 0 ? 1 : 0;
   const auto observe = [&](int step, const StepProblem& problem, const State& state) {
     const std::vector<signed char> now = step_regimes(problem, state.u);
     for (std::size_t q = 0; q < now.size(); ++q) result.switches += now[q] != regimes_[step][q];

@@ -117,7 +117,7 @@ void review_collider(const SceneModel& scene_model, const ColliderScene& collide
 
 void review_ligaments(const SceneModel& scene_model, std::vector<std::string>& warnings) {
   const Scene& scene = scene_model.scene();
-  if (!scene.ligaments) return;
+  if (!scene.ligaments || scene.ligaments->sources.empty()) return;
   const SkinMesh& mesh = scene_model.model().mesh;
   MatrixX3 inner(mesh.num_columns, 3);
   for (int c = 0; c < mesh.num_columns; ++c) inner.row(c) = mesh.rest.row(mesh.node(c, 0));

@@ -52,6 +52,7 @@ void StepTable::advance_work(const StepReading& reading) {
 void StepTable::add(const StepEvent& event) {
   const StepReading reading = read_step(event.problem, event.state);
   advance_work(reading);
+  if (event.record.frame == 0) work_ = reading.stored;  // what it took to put the skin under tension
   const MinimiserReport& report = event.record.report;
   const auto count = [](auto n) { return CsvCell(static_cast<std::int64_t>(n)); };
   std::vector<CsvCell> row = {count(table_.num_rows() + 1), count(event.record.frame), event.record.step.t,

@@ -69,7 +69,8 @@ class ForwardRun {
   void begin(const State& rest) {
     std::error_code ignored;
     std::filesystem::remove(folder_ + "/state.bin", ignored);
-    frames_.write(0, rest);
+    // A settling step leads to frame 0 and writes it then.
+    if (!scene_model_.run_options().settle) frames_.write(0, rest);
     write_table();
     record_.write("running");
   }
@@ -115,7 +116,7 @@ class ForwardRun {
     record_.write("running");
     const TimeScene& time = scene_model_.scene().time;
     const double steps = event.state.time * time.frame_rate * time.substeps;
-    context_.progress.step_done(static_cast<int>(std::floor(steps + 1e-6)));
+    context_.progress.step_done(static_cast<int>(std::floor(std::max(0., steps) + 1e-6)));
     solve_started_ = now();
   }
 

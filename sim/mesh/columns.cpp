@@ -1,6 +1,7 @@
 #include "sim/mesh/columns.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace rhytid {
@@ -83,6 +84,23 @@ void find_rim(const TriangleSurface& surface, const SurfaceEdges& topology, cons
 }
 
 }  // namespace
+
+VectorXd interpolate_vertices(const TriangleSurface& surface, const std::vector<int>& face_columns,
+                              const TriangleBasis& basis, const VectorXd& at_vertices) {
+  VectorXd values = VectorXd::Zero(*std::max_element(face_columns.begin(), face_columns.end()) + 1);
+  const double p = basis.order();
+  for (std::size_t face = 0; face < surface.faces.size(); ++face) {
+    const auto& corners = surface.faces[face];
+    for (int node = 0; node < basis.num_nodes(); ++node) {
+      const auto [i, j] = basis.lattice()[node];
+      values[face_columns[face * basis.num_nodes() + node]] =
+          ((p - i - j) * at_vertices[corners[0]] + i * at_vertices[corners[1]] +
+           j * at_vertices[corners[2]]) /
+          p;
+    }
+  }
+  return values;
+}
 
 Vec3 bend(const Vec3& flat, double radius) {
   const double angle = flat.x() / radius;

@@ -25,6 +25,10 @@ struct Columns {
 Columns make_columns(const TriangleSurface& surface, const SurfaceEdges& topology, const TriangleBasis& basis,
                      const MatrixX3& vertex_directions, double bend_radius);
 
+/// Values at all columns from values at the vertices, linear on every face.
+VectorXd interpolate_vertices(const TriangleSurface& surface, const std::vector<int>& face_columns,
+                              const TriangleBasis& basis, const VectorXd& at_vertices);
+
 /// The point of the cylinder about the y axis that (x, y, 0) is rolled onto.
 Vec3 bend(const Vec3& flat, double radius);
 

@@ -26,6 +26,10 @@ void check_options(const ExtrusionOptions& options) {
     require(layer.thickness > 0, "extrude: layer thickness must be positive");
     require(layer.elements >= 1, "extrude: a layer needs at least one element");
     require(layer.order >= 1 && layer.order <= 4, "extrude: the thickness order must be 1..4");
+    require(layer.by_vertex.size() == 0 || layer.by_vertex.minCoeff() > 0,
+            "extrude: layer thickness must be positive at every vertex");
+    require(layer.by_vertex.size() == 0 || !options.composite || options.layers.size() == 1,
+            "extrude: a composite of several layers has constant thicknesses");
   }
   require(options.composite_order >= 1 && options.composite_order <= 4,
           "extrude: the composite order must be 1..4");
@@ -47,13 +51,15 @@ void check_bend(const TriangleSurface& surface, const ExtrusionOptions& options)
                      "), expected a radius above " + format("%.4g mm", half_width / std::numbers::pi));
 }
 
-// Fills the element layers; returns the height of each level above the inner surface, mm.
-std::vector<double> stack_layers(const ExtrusionOptions& options, SkinMesh& mesh) {
-  std::vector<double> heights{0};
-  const auto add_sheet = [&](double thickness, int order, std::vector<MaterialSlab> slabs) {
-    const double base = heights.back();
+// Fills the element layers; returns the height of each level above the inner surface at every column, mm,
+// [level][column]. `thickness` [layer][column].
+std::vector<VectorXd> stack_layers(const ExtrusionOptions& options, const std::vector<VectorXd>& thickness,
+                                   SkinMesh& mesh) {
+  std::vector<VectorXd> heights{VectorXd::Zero(thickness[0].size())};
+  const auto add_sheet = [&](const VectorXd& sheet, int order, std::vector<MaterialSlab> slabs) {
+    const VectorXd base = heights.back();
     mesh.element_layers.push_back({static_cast<int>(heights.size()) - 1, order, std::move(slabs)});
-    for (int k = 1; k <= order; ++k) heights.push_back(base + thickness * k / order);
+    for (int k = 1; k <= order; ++k) heights.emplace_back(base + sheet * k / order);
   };
   if (options.composite) {
     const double total = total_thickness(options);
@@ -65,12 +71,14 @@ std::vector<double> stack_layers(const ExtrusionOptions& options, SkinMesh& mesh
       slabs.push_back({material, begin, 2 * below / total - 1});
     }
     slabs.back().w_end = 1;
-    add_sheet(total, options.composite_order, slabs);
+    VectorXd sheet = thickness[0];
+    for (std::size_t layer = 1; layer < thickness.size(); ++layer) sheet += thickness[layer];
+    add_sheet(sheet, options.composite_order, slabs);
   } else {
     for (int material = 0; material < static_cast<int>(options.layers.size()); ++material) {
       const ExtrusionLayer& layer = options.layers[material];
       for (int element = 0; element < layer.elements; ++element)
-        add_sheet(layer.thickness / layer.elements, layer.order, {{material, -1, 1}});
+        add_sheet(thickness[material] / layer.elements, layer.order, {{material, -1, 1}});
     }
   }
   return heights;
@@ -97,14 +105,16 @@ struct HeightQuadratic {
 };
 
 void refuse_folds(const TriangleSurface& surface, const TriangleBasis& basis, const Columns& columns,
-                  const ExtrusionOptions& options) {
+                  const VectorXd& thickness, const ExtrusionOptions& options) {
   const int nodes = basis.num_nodes();
-  const double thickness = total_thickness(options), direction = options.surface_is_outer ? -1 : 1;
+  const double direction = options.surface_is_outer ? -1 : 1;
+  // Where the thickness h varies, x_u gains h_u n, which drops out of D: the local height still decides.
   std::vector<double> d_du(nodes), d_dv(nodes);
   std::vector<int> folded;
   double shallowest = std::numeric_limits<double>::infinity();
   for (int face = 0; face < static_cast<int>(surface.faces.size()); ++face) {
     double depth = std::numeric_limits<double>::infinity();
+    bool folds = false;
     for (int node = 0; node < nodes; ++node) {
       basis.evaluate(basis.nodes()[node][0], basis.nodes()[node][1], nullptr, d_du.data(), d_dv.data());
       Vec3 x_u = Vec3::Zero(), x_v = Vec3::Zero(), n_u = Vec3::Zero(), n_v = Vec3::Zero();
@@ -115,10 +125,13 @@ void refuse_folds(const TriangleSurface& surface, const TriangleBasis& basis, co
         n_u += d_du[j] * columns.normals.row(column).transpose();
         n_v += d_dv[j] * columns.normals.row(column).transpose();
       }
-      const Vec3 n = columns.normals.row(columns.face_columns[face * nodes + node]);
-      depth = std::min(depth, HeightQuadratic(x_u, x_v, n_u, n_v, n).first_fold(direction));
+      const int column = columns.face_columns[face * nodes + node];
+      const Vec3 n = columns.normals.row(column);
+      const double here = HeightQuadratic(x_u, x_v, n_u, n_v, n).first_fold(direction);
+      folds = folds || here <= thickness[column];
+      depth = std::min(depth, here);
     }
-    if (depth <= thickness) folded.push_back(face);
+    if (folds) folded.push_back(face);
     shallowest = std::min(shallowest, depth);
   }
   if (folded.empty()) return;
@@ -126,12 +139,12 @@ void refuse_folds(const TriangleSurface& surface, const TriangleBasis& basis, co
   for (std::size_t i = 0; i < std::min<std::size_t>(folded.size(), 5); ++i)
     faces += (i ? ", " : "") + std::to_string(surface.file_face(folded[i]));
   if (folded.size() > 5) faces += ", ...";
-  throw InputError(surface.origin + ": extruding " + format("%.4g mm ", thickness) +
+  throw InputError(surface.origin + ": extruding " + format("%.4g mm ", thickness.maxCoeff()) +
                    (options.surface_is_outer ? "inwards" : "outwards") + " folds " +
                    std::to_string(folded.size()) + " of " + std::to_string(surface.faces.size()) +
                    " faces (" + faces + "), the first at a depth of " + format("%.4g mm", shallowest) +
                    (shallowest > 0 ? format(" (thickness to curvature radius %.3g, expected below 1)",
-                                            thickness / shallowest)
+                                            thickness.maxCoeff() / shallowest)
                                    : std::string(" (the smoothed normal leaves the front of the face)")) +
                    "; use a thinner skin, a smoother or coarser surface, or other normal_smoothing");
 }
@@ -145,21 +158,32 @@ SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options
   const TriangleBasis basis(options.order);
   Columns columns = make_columns(surface, SurfaceEdges(surface.faces), basis,
                                  vertex_normals(surface, options.normal_smoothing), options.bend_radius);
-  refuse_folds(surface, basis, columns, options);
+  std::vector<VectorXd> thickness;  // [layer][column]
+  VectorXd total = VectorXd::Zero(columns.positions.rows());
+  for (const ExtrusionLayer& layer : options.layers) {
+    require(layer.by_vertex.size() == 0 || layer.by_vertex.size() == surface.vertices.rows(),
+            "extrude: a thickness per vertex needs one for every vertex");
+    thickness.push_back(layer.by_vertex.size() > 0
+                            ? interpolate_vertices(surface, columns.face_columns, basis, layer.by_vertex)
+                            : VectorXd::Constant(columns.positions.rows(), layer.thickness));
+    total += thickness.back();
+  }
+  refuse_folds(surface, basis, columns, total, options);
 
   SkinMesh mesh;
   mesh.order = options.order;
   mesh.num_faces = static_cast<int>(surface.faces.size());
   mesh.num_columns = static_cast<int>(columns.positions.rows());
   mesh.face_columns = std::move(columns.face_columns);
-  const std::vector<double> heights = stack_layers(options, mesh);
+  const std::vector<VectorXd> heights = stack_layers(options, thickness, mesh);
   mesh.num_levels = static_cast<int>(heights.size());
   mesh.rest.resize(mesh.num_nodes(), 3);
-  const double given = options.surface_is_outer ? heights.back() : 0;
-  for (int column = 0; column < mesh.num_columns; ++column)
+  for (int column = 0; column < mesh.num_columns; ++column) {
+    const double given = options.surface_is_outer ? heights.back()[column] : 0;
     for (int level = 0; level < mesh.num_levels; ++level)
       mesh.rest.row(mesh.node(column, level)) =
-          columns.positions.row(column) + (heights[level] - given) * columns.normals.row(column);
+          columns.positions.row(column) + (heights[level][column] - given) * columns.normals.row(column);
+  }
   mesh.column_normals = std::move(columns.normals);
   mesh.rim_columns = std::move(columns.rim);
   mesh.rim_directions = std::move(columns.rim_directions);

@@ -1,6 +1,7 @@
 #include "sim/mesh/skin_mesh.h"
 
 #include "sim/core/error.h"
+#include "sim/mesh/columns.h"
 
 namespace rhytid {
 namespace {
@@ -32,6 +33,10 @@ std::vector<int> SkinMesh::inner_nodes(int face) const {
 }
 std::vector<int> SkinMesh::outer_nodes(int face) const {
   return trace_nodes(*this, face, num_levels - 1);
+}
+
+VectorXd interpolate_vertices(const SkinMesh& mesh, const VectorXd& at_vertices) {
+  return interpolate_vertices(mesh.surface, mesh.face_columns, TriangleBasis(mesh.order), at_vertices);
 }
 
 }  // namespace rhytid

@@ -56,9 +56,10 @@ struct SkinMesh {
 
 /// How to extrude: thickness per material layer from inner to outer, elements and thickness order per layer.
 struct ExtrusionLayer {
-  double thickness;  ///< mm, > 0
-  int elements = 1;  ///< element layers in this material layer (stacked only)
-  int order = 2;     ///< q of those elements (stacked only)
+  double thickness;      ///< mm, > 0
+  int elements = 1;      ///< element layers in this material layer (stacked only)
+  int order = 2;         ///< q of those elements (stacked only)
+  VectorXd by_vertex{};  ///< mm, [vertices of the surface], in place of `thickness`; empty = constant
 };
 struct ExtrusionOptions {
   int order = 3;                       ///< p
@@ -78,6 +79,11 @@ struct ExtrusionOptions {
 /// composite fill slabs of w in proportion to their thickness.
 /// Validates the surface first; throws InputError when the extrusion folds (J ≤ 0 at a node of some element),
 /// naming face numbers, the depth at which the first fold appears, and a hint.
+/// A thickness per vertex is linear on the faces; it needs the stacked scheme or a single layer, since the
+/// slabs of a composite are the same everywhere.
 SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options);
+
+/// Values at all columns from values at the vertices of mesh.surface, linear on every face.
+VectorXd interpolate_vertices(const SkinMesh& mesh, const VectorXd& at_vertices);
 
 }  // namespace rhytid

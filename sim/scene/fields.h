@@ -17,7 +17,10 @@ concept FieldsOf = std::is_same_v<std::remove_const_t<A>, T>;
 template <class Archive, FieldsOf<LayerScene> T>
 void fields(Archive& archive, T& layer) {
   archive("name", layer.name);
-  archive("thickness", layer.thickness);
+  if (archive.has("thickness_map", !layer.thickness_map.empty()))
+    archive("thickness_map", layer.thickness_map);
+  else
+    archive("thickness", layer.thickness);
   archive("elements", layer.elements);
   archive("order", layer.order);
   archive("youngs_modulus", layer.youngs_modulus);
@@ -60,6 +63,13 @@ void fields(Archive& archive, T& surface) {
   archive("normal_smoothing", surface.normal_smoothing);
 }
 
+template <class Archive, FieldsOf<PreStretchScene> T>
+void fields(Archive& archive, T& pre_stretch) {
+  archive("stretch", pre_stretch.stretch);
+  archive("across", pre_stretch.across);
+  archive("direction", pre_stretch.direction);
+}
+
 template <class Archive, FieldsOf<SkinScene> T>
 void fields(Archive& archive, T& skin) {
   archive("surface", skin.surface);
@@ -69,9 +79,12 @@ void fields(Archive& archive, T& skin) {
   archive.group("quadrature", true, [&skin](auto& quadrature) {
     quadrature("triangle_degree", skin.triangle_degree);
     quadrature("thickness_points", skin.thickness_points);
+    quadrature("prism_degree", skin.prism_degree);
+    quadrature("volume", skin.volume);
     quadrature("contact_degree", skin.contact_degree);
   });
   archive("rim", skin.rim);
+  archive("pre_stretch", skin.pre_stretch);
   archive("layers", skin.layers);
 }
 
@@ -88,10 +101,16 @@ void fields(Archive& archive, T& source) {
 
 template <class Archive, FieldsOf<LigamentScene> T>
 void fields(Archive& archive, T& ligaments) {
+  archive("law", ligaments.law);
   archive("stiffness", ligaments.stiffness);
   archive("smoothing", ligaments.smoothing);
-  archive("diffusion_time", ligaments.diffusion_time);
-  archive("sources", ligaments.sources);
+  if (archive.has("map", !ligaments.map.empty())) {
+    archive("map", ligaments.map);
+    archive("map_scale", ligaments.map_scale);
+  } else {
+    archive("diffusion_time", ligaments.diffusion_time);
+    archive("sources", ligaments.sources);
+  }
 }
 
 template <class Archive, FieldsOf<BaseScene> T>

@@ -6,6 +6,7 @@
 #include "sim/scene/located_json.h"
 #include "sim/scene/names.h"
 #include "sim/scene/validate.h"
+#include "sim/scene/vertex_values.h"
 
 namespace rhytid {
 namespace {
@@ -133,6 +134,22 @@ class Writer {
   json target_ = json::object();
 };
 
+/// Reads the files with values per vertex that the scene mentions.
+void read_vertex_files(Scene& scene, const LocatedJson& resolved) {
+  const auto read = [&resolved](const std::string& path, const std::string& pointer) {
+    return read_vertex_values(path, resolved.where(pointer) + ": " + pointer);
+  };
+  for (size_t i = 0; i < scene.skin.layers.size(); ++i) {
+    LayerScene& layer = scene.skin.layers[i];
+    if (layer.thickness_map.empty()) continue;
+    layer.thickness_by_vertex =
+        read(layer.thickness_map, "/skin/layers/" + std::to_string(i) + "/thickness_map");
+    layer.thickness = mean_of_given(layer.thickness_by_vertex);
+  }
+  if (scene.ligaments && !scene.ligaments->map.empty())
+    scene.ligaments->b_by_vertex = read(scene.ligaments->map, "/ligaments/map");
+}
+
 Scene to_scene(const LocatedJson& located, const std::string& file) {
   const LocatedJson resolved = resolve_against_rules(located);
   check_consistency(resolved);
@@ -140,6 +157,7 @@ Scene to_scene(const LocatedJson& located, const std::string& file) {
   Reader reader(resolved.json);
   fields(reader, scene);
   scene.file = file;
+  read_vertex_files(scene, resolved);
   return scene;
 }
 

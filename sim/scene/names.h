@@ -27,6 +27,14 @@ struct EnumNames<ThicknessScheme> {
   static constexpr std::array<std::string_view, 2> words{"stacked", "composite"};
 };
 template <>
+struct EnumNames<LigamentForm> {
+  static constexpr std::array<std::string_view, 2> words{"exponential", "fung_quadratic"};
+};
+template <>
+struct EnumNames<VolumeQuadrature> {
+  static constexpr std::array<std::string_view, 2> words{"full", "reduced"};
+};
+template <>
 struct EnumNames<ShapeKind> {
   static constexpr std::array<std::string_view, 3> words{"sphere", "plane", "imls"};
 };

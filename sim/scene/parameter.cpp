@@ -36,10 +36,22 @@ const Kind kinds[] = {
      [](Scene& s, size_t i) { return &s.skin.layers[i].relaxing_fraction; }},
     {"/skin/layers/*/relaxation_time", 1e-3, 1e2, log,
      [](Scene& s, size_t i) { return &s.skin.layers[i].relaxation_time; }},
+    {"/skin/pre_stretch/stretch", 0.5, 2, log,
+     [](Scene& s, size_t) { return s.skin.pre_stretch ? &s.skin.pre_stretch->stretch : nullptr; }},
+    {"/skin/pre_stretch/across", 0.5, 2, log,
+     [](Scene& s, size_t) {
+       return s.skin.pre_stretch && s.skin.pre_stretch->across ? &*s.skin.pre_stretch->across : nullptr;
+     }},
     {"/ligaments/stiffness", 1e-7, 1, log,
      [](Scene& s, size_t) { return s.ligaments ? &s.ligaments->stiffness : nullptr; }},
     {"/ligaments/diffusion_time", 1e-2, 1e5, log,
-     [](Scene& s, size_t) { return s.ligaments ? &s.ligaments->diffusion_time : nullptr; }},
+     [](Scene& s, size_t) {
+       return s.ligaments && s.ligaments->map.empty() ? &s.ligaments->diffusion_time : nullptr;
+     }},
+    {"/ligaments/map_scale", 1e-3, 1e3, log,
+     [](Scene& s, size_t) {
+       return s.ligaments && !s.ligaments->map.empty() ? &s.ligaments->map_scale : nullptr;
+     }},
     {"/ligaments/sources/*/strength", 1e-3, 1e2, log,
      [](Scene& s, size_t i) { return &s.ligaments->sources[i].strength; }},
     {"/base/stiffness", 1e-3, 1e3, log,

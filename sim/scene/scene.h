@@ -14,11 +14,16 @@ namespace rhytid {
 
 enum class RimCondition { clamped, sliding, free };
 enum class ThicknessScheme { stacked, composite };
+enum class LigamentForm { exponential, fung_quadratic };
+enum class VolumeQuadrature { full, reduced };
 enum class ShapeKind { sphere, plane, imls };
 
 struct LayerScene {
   std::string name;
-  double thickness = 0;       ///< mm
+  double thickness = 0;       ///< mm; the mean of thickness_by_vertex when that is given
+  std::string thickness_map;  ///< resolved path of a file with a thickness per vertex, empty when constant
+  std::vector<double>
+      thickness_by_vertex;    ///< mm, by vertex of the input surface, NaN = none; from that file
   int elements = 1;           ///< element layers (stacked)
   int order = 2;              ///< q (stacked)
   double youngs_modulus = 0;  ///< MPa, instantaneous: mu = E / 2(1+nu), K = E / 3(1−2nu)
@@ -56,10 +61,15 @@ struct SourceScene {
 };
 
 struct LigamentScene {
-  double stiffness = 5e-4;     ///< k, MPa
-  double smoothing = 0;        ///< eps, mm (0 = 1e-2 of the skin thickness)
+  double stiffness = 5e-4;  ///< k, MPa
+  double smoothing = 0;     ///< eps, mm (0 = 1e-2 of the skin thickness)
+  LigamentForm law = LigamentForm::exponential;
   double diffusion_time = 20;  ///< t, mm²
   std::vector<SourceScene> sources;
+  // Or, in place of sources, b itself:
+  std::string map;                  ///< resolved path of a file with b per vertex, empty with sources
+  std::vector<double> b_by_vertex;  ///< 1/mm, by vertex of the input surface, NaN = none; from that file
+  double map_scale = 1;             ///< factor on the map
 };
 
 struct FrictionScene {
@@ -111,6 +121,13 @@ struct SolverScene {
   int lbfgs_memory = 20, lbfgs_refresh = 20;
 };
 
+/// Tension of the skin in its rest shape (sim/terms/pre_stretch_law.h).
+struct PreStretchScene {
+  double stretch = 1;             ///< λ₁; in all in-plane directions without `across`
+  std::optional<double> across;   ///< λ₂, at right angles to `direction`
+  std::optional<Vec3> direction;  ///< of λ₁, projected to the surface
+};
+
 struct SkinScene {
   SurfaceScene surface;
   int order = 3;  ///< p
@@ -118,8 +135,11 @@ struct SkinScene {
   int composite_order = 3;   ///< q when composite
   int triangle_degree = 0;   ///< 0 = 2p+2 (10 for p = 4)
   int thickness_points = 0;  ///< per layer; 0 = q + 1
-  int contact_degree = 0;    ///< triangle degree on contact and ligament surfaces; 0 = max(10, 2p+2)
+  int prism_degree = 0;      ///< of a prism rule in place of the product of the two above; 0 = the product
+  VolumeQuadrature volume = VolumeQuadrature::full;
+  int contact_degree = 0;  ///< triangle degree on contact and ligament surfaces; 0 = max(10, 2p+2)
   RimCondition rim = RimCondition::clamped;
+  std::optional<PreStretchScene> pre_stretch;
   std::vector<LayerScene> layers;  ///< inner to outer
 };
 

@@ -11,7 +11,7 @@
 namespace rhytid {
 
 SceneModel::SceneModel(Scene scene) : scene_(std::move(scene)) {
-  model_.mesh = build_skin_mesh(scene_.skin);
+  model_.mesh = build_skin_mesh(scene_);
   parts_.push_back(std::make_shared<SkinPart>());
   if (scene_.ligaments) {
     ligaments_ = std::make_shared<LigamentPart>(scene_, model_.mesh);
@@ -40,6 +40,7 @@ RunOptions SceneModel::run_options() const {
   o.frame_rate = scene_.time.frame_rate;
   o.frames = scene_.time.frames;
   o.substeps = scene_.time.substeps;
+  o.settle = scene_.skin.pre_stretch.has_value();
   o.max_bisections = scene_.time.max_bisections;
   MinimiserOptions& m = o.minimiser;
   m.method = scene_.solver.minimiser == "lbfgs"              ? Minimiser::lbfgs

@@ -195,13 +195,14 @@ void require_unique_names(const LocatedJson& scene, const json& list, const std:
     }
 }
 
-void require_direction(const LocatedJson& scene, const json& holder, const std::string& pointer) {
-  const json& normal = holder["normal"];
+void require_direction(const LocatedJson& scene, const json& holder, const std::string& pointer,
+                       const std::string& key = "normal") {
+  const json& normal = holder[key];
   double largest = 0;
   for (const json& component : normal) largest = std::max(largest, std::abs(component.get<double>()));
   // Beyond these sizes the squared length would leave the range of a double.
   if (largest < 1e-100 || largest > 1e100)
-    throw InputError(scene.where(pointer + "/normal") + ": " + pointer + "/normal", shown_json(normal),
+    throw InputError(scene.where(pointer + "/" + key) + ": " + pointer + "/" + key, shown_json(normal),
                      "a vector that is not zero");
 }
 
@@ -224,6 +225,36 @@ void check_crop(const LocatedJson& scene) {
                        "low below high in every coordinate");
 }
 
+/// Quadrature keys that exclude each other, the direction of a pre-stretch, thickness per vertex in a
+/// composite.
+void check_skin(const LocatedJson& scene) {
+  const json& root = scene.json;
+  const json& quadrature = root["skin"]["quadrature"];
+  if (quadrature["prism_degree"].get<int>() > 0) {
+    for (const char* key : {"triangle_degree", "thickness_points"})
+      if (quadrature[key].get<int>() > 0) {
+        const std::string at = std::string("/skin/quadrature/") + key;
+        throw InputError(scene.where(at) + ": " + at, "both it and prism_degree", "one of the two");
+      }
+    if (quadrature["volume"] == "reduced")
+      throw InputError(scene.where("/skin/quadrature/volume") + ": /skin/quadrature/volume",
+                       "\"reduced\" with a prism_degree", "\"full\", or a product rule");
+  }
+  if (quadrature["volume"] == "reduced" && quadrature["thickness_points"] == 1)
+    throw InputError(scene.where("/skin/quadrature/thickness_points") + ": /skin/quadrature/thickness_points",
+                     "1 with a reduced volume", "2 or more");
+  if (root["skin"].contains("pre_stretch") && root["skin"]["pre_stretch"].contains("direction"))
+    require_direction(scene, root["skin"]["pre_stretch"], "/skin/pre_stretch", "direction");
+  if (root["skin"]["scheme"] == "composite" && root["skin"]["layers"].size() > 1)
+    for (size_t i = 0; i < root["skin"]["layers"].size(); ++i)
+      if (root["skin"]["layers"][i].contains("thickness_map")) {
+        const std::string at = "/skin/layers/" + std::to_string(i) + "/thickness_map";
+        throw InputError(scene.where(at) + ": " + at,
+                         "a thickness per vertex in a composite of several layers",
+                         "the stacked scheme, or one layer");
+      }
+}
+
 }  // namespace
 
 LocatedJson resolve_against_rules(const LocatedJson& scene, const RuleNode& rules) {
@@ -235,10 +266,11 @@ void check_consistency(const LocatedJson& scene) {
   const json& root = scene.json;
   require_unique_names(scene, root["skin"]["layers"], "/skin/layers");
   check_crop(scene);
-  if (root.contains("ligaments"))
+  if (root.contains("ligaments") && root["ligaments"].contains("sources"))
     require_unique_names(scene, root["ligaments"]["sources"], "/ligaments/sources");
   require_unique_names(scene, root["colliders"], "/colliders");
 
+  check_skin(scene);
   if (root.contains("base")) {
     const json& base = root["base"];
     require_direction(scene, base, "/base");

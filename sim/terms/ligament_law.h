@@ -9,7 +9,8 @@
 //          quadratic one is the usual Fung spring: smooth, no threshold, stiffness k at rest.
 //          Beyond an exponent of 50 both exponentials are continued by their tangent, so that trial steps
 //          stay finite.
-// Units    exponential k [MPa], b [1/mm]; fung_quadratic k [MPa/mm], b [1/mm²]; ε, u [mm]; Ψ [mJ/mm²].
+// Units    k [MPa], b [1/mm] of both laws (that is what ℓ is for: k is the traction at d = 1 mm when b = 0);
+//          ε, u [mm]; Ψ [mJ/mm²].
 // Shapes   e = u [3], θ = k, ε, b (fung_quadratic leaves ε alone).
 // Smooth   analytic below the exponent 50, C¹ in the force there.
 // Tests    tests/sim/terms/law_edges_test.cpp, law_properties_test.cpp,

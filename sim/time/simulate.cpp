@@ -29,80 +29,124 @@ MinimiserReport solve_step(StepProblem& problem, const State& old, const Minimis
   return minimise(problem, q, options, factor, matrix, callback);
 }
 
+namespace {
+
+/// The steps of a run one after the other.
+class Runner {
+ public:
+  Runner(const Model& model, const VectorXd& native, const RunOptions& options, const RunObserver& observer,
+         const State* initial)
+      : model_(model),
+        native_(native),
+        options_(options),
+        observer_(observer),
+        start_(std::chrono::steady_clock::now()),
+        matrix_(model.pattern()),
+        factor_(model.pattern()) {
+    run_.initial = initial ? *initial : model.rest_state();
+    current_ = run_.initial;
+  }
+
+  Trajectory go() {
+    const double t0 = options_.frames_done > 0 ? 0 : run_.initial.time;
+    if (options_.settle && options_.frames_done == 0) {
+      current_.time = t0 - kSettlingTime;
+      // Halving the time would not halve the tension: no bisection.
+      if (!advance(0, t0, options_.max_bisections, true)) return finish(false);
+    }
+    run_.frame_end.push_back(static_cast<int>(run_.steps.size()));
+    const double frame_dt = 1 / options_.frame_rate;
+    for (int frame = options_.frames_done + 1; frame <= options_.frames; ++frame) {
+      for (int sub = 1; sub <= options_.substeps; ++sub) {
+        // Times from integers, so that they do not depend on how often steps were bisected.
+        const double t_end = t0 + frame_dt * (frame - 1 + static_cast<double>(sub) / options_.substeps);
+        if (!advance(frame, t_end, 0, sub == options_.substeps)) return finish(false);
+      }
+      run_.frame_end.push_back(static_cast<int>(run_.steps.size()));
+    }
+    return finish(true);
+  }
+
+ private:
+  Trajectory finish(bool complete) {
+    run_.complete = complete;
+    run_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    return std::move(run_);
+  }
+
+  /// Steps from the current time to t_end, bisected where needed. `depth`: halvings already used up.
+  bool advance(int frame, double t_end, int depth_used, bool ends_frame) {
+    // A pending stack of end times: a failed step is replaced by its two halves.
+    std::vector<std::pair<double, int>> pending{{t_end, depth_used}};
+    while (!pending.empty()) {
+      const auto [target, depth] = pending.back();
+      const StepInfo step{static_cast<int>(run_.steps.size()), current_.time, target};
+      StepProblem problem(model_, native_, step, current_);
+      VectorXd q;
+      IterationCallback callback;
+      if (observer_.iteration)
+        callback = [&, t = target](int it, double e, double r) {
+          return observer_.iteration(frame, t, it, e, r);
+        };
+      MinimiserReport report =
+          solve_step(problem, current_, options_.minimiser, factor_, matrix_, q, callback);
+      bool softened = false;
+      if (!report.converged()) {
+        if (report.status != MinimiserStatus::interrupted && depth < options_.max_bisections) {
+          pending.back().second = depth + 1;
+          pending.emplace_back(0.5 * (current_.time + target), depth + 1);
+          continue;
+        }
+        if (report.status != MinimiserStatus::interrupted) {
+          VectorXd q_softened;
+          MinimiserReport last =
+              solve_step_softened(problem, options_.minimiser, factor_, matrix_, q_softened, callback);
+          softened = last.converged();
+          if (softened || last.status == MinimiserStatus::interrupted) {
+            report = std::move(last);
+            q = std::move(q_softened);
+          }
+        }
+      }
+      if (!report.converged()) {
+        char text[256];
+        std::snprintf(text, sizeof text,
+                      "frame %d, t = %.6g s: %s after %d iterations and %d bisections (residual %.3g N, "
+                      "wanted %.3g N)",
+                      frame, target, name(report.status), report.iterations, depth - depth_used,
+                      report.residual, report.tolerance);
+        run_.failure = text;
+        return false;
+      }
+      pending.pop_back();
+      State next = problem.advance(model_.to_displacement(q));
+      StepRecord record{step, frame, depth - depth_used, softened, {}, std::move(report)};
+      const bool frame_done = pending.empty() && ends_frame;
+      if (observer_.step) observer_.step({problem, next, record, frame_done});
+      current_ = std::move(next);
+      if (options_.keep_states) record.state = current_;
+      run_.steps.push_back(std::move(record));
+    }
+    return true;
+  }
+
+  const Model& model_;
+  const VectorXd& native_;
+  const RunOptions& options_;
+  const RunObserver& observer_;
+  std::chrono::steady_clock::time_point start_;
+  BlockMatrix matrix_;
+  CholeskyFactor factor_;
+  Trajectory run_;
+  State current_;
+};
+
+}  // namespace
+
 Trajectory simulate(const Model& model, const VectorXd& native, const RunOptions& options,
                     const RunObserver& observer, const State* initial) {
   options.validate();
-  const auto start = std::chrono::steady_clock::now();
-  Trajectory run;
-  run.initial = initial ? *initial : model.rest_state();
-  run.frame_end.push_back(0);
-  State current = run.initial;
-  BlockMatrix matrix(model.pattern());
-  CholeskyFactor factor(model.pattern());
-  const double frame_dt = 1 / options.frame_rate;
-  const double t0 = options.frames_done > 0 ? 0 : run.initial.time;
-
-  for (int frame = options.frames_done + 1; frame <= options.frames; ++frame) {
-    for (int sub = 1; sub <= options.substeps; ++sub) {
-      // Times from integers, so that they do not depend on how often steps were bisected.
-      const double t_end = t0 + frame_dt * (frame - 1 + static_cast<double>(sub) / options.substeps);
-      // A pending stack of end times: a failed step is replaced by its two halves.
-      std::vector<std::pair<double, int>> pending{{t_end, 0}};
-      while (!pending.empty()) {
-        const auto [target, depth] = pending.back();
-        const StepInfo step{static_cast<int>(run.steps.size()), current.time, target};
-        StepProblem problem(model, native, step, current);
-        VectorXd q;
-        IterationCallback callback;
-        if (observer.iteration)
-          callback = [&, t = target](int it, double e, double r) {
-            return observer.iteration(frame, t, it, e, r);
-          };
-        MinimiserReport report = solve_step(problem, current, options.minimiser, factor, matrix, q, callback);
-        bool softened = false;
-        if (!report.converged()) {
-          if (report.status != MinimiserStatus::interrupted && depth < options.max_bisections) {
-            pending.back().second = depth + 1;
-            pending.emplace_back(0.5 * (current.time + target), depth + 1);
-            continue;
-          }
-          if (report.status != MinimiserStatus::interrupted) {
-            VectorXd q_softened;
-            MinimiserReport last =
-                solve_step_softened(problem, options.minimiser, factor, matrix, q_softened, callback);
-            softened = last.converged();
-            if (softened || last.status == MinimiserStatus::interrupted) {
-              report = std::move(last);
-              q = std::move(q_softened);
-            }
-          }
-        }
-        if (!report.converged()) {
-          char text[256];
-          std::snprintf(text, sizeof text,
-                        "frame %d, t = %.6g s: %s after %d iterations and %d bisections (residual %.3g N, "
-                        "wanted %.3g N)",
-                        frame, target, name(report.status), report.iterations, depth, report.residual,
-                        report.tolerance);
-          run.failure = text;
-          run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-          return run;
-        }
-        pending.pop_back();
-        State next = problem.advance(model.to_displacement(q));
-        StepRecord record{step, frame, depth, softened, {}, std::move(report)};
-        const bool frame_done = pending.empty() && sub == options.substeps;
-        if (observer.step) observer.step({problem, next, record, frame_done});
-        current = std::move(next);
-        if (options.keep_states) record.state = current;
-        run.steps.push_back(std::move(record));
-      }
-    }
-    run.frame_end.push_back(static_cast<int>(run.steps.size()));
-  }
-  run.complete = true;
-  run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return run;
+  return Runner(model, native, options, observer, initial).go();
 }
 
 }  // namespace rhytid

@@ -15,16 +15,23 @@ struct RunOptions {
   int frames = 0;          ///< frames after the rest frame
   int substeps = 1;        ///< steps per frame
   int frames_done = 0;     ///< frames behind `initial`, when it continues a run that began at time 0
+  /// Before frame 0 the skin comes to rest: one step of kSettlingTime that ends at time 0 with the damper
+  /// fully relaxed. Needed when the rest shape is under tension (pre-stretch). It is not taken when
+  /// frames_done > 0.
+  bool settle = false;
   int max_bisections = 4;  ///< a step that fails is halved at most this often
   MinimiserOptions minimiser;
   bool keep_states = true;  ///< keep every step's state in the trajectory (needed for gradients)
   void validate() const;    ///< throws ContractError naming the field
 };
 
+/// Long against every relaxation time, s.
+inline constexpr double kSettlingTime = 1e9;
+
 /// One converged step.
 struct StepRecord {
   StepInfo step;
-  int frame = 0;          ///< frame the step leads to (1-based; frame 0 is rest)
+  int frame = 0;          ///< frame the step leads to (frame 0 is rest: only the settling step leads there)
   int bisections = 0;     ///< how often the nominal step was halved
   bool softened = false;  ///< its start came from softened penalties (the equations solved are the scene's)
   State state;            ///< after the step (empty when states are not kept)
@@ -35,7 +42,7 @@ struct Trajectory {
   State initial;
   std::vector<StepRecord> steps;
   std::vector<int>
-      frame_end;          ///< [frames reached + 1] number of steps done at the end of each frame; [0] = 0
+      frame_end;          ///< [frames reached + 1] steps done at the end of each frame; [0] = 0, settled 1
   bool complete = false;  ///< every frame was reached
   std::string failure;    ///< one sentence when not complete
   double seconds = 0;     ///< wall time

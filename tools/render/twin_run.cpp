@@ -40,6 +40,7 @@ TwinRun run_twin(const SceneModel& truth, int stride, Progress& progress) {
     if (!event.frame_done) return;
     progress.step_done(event.record.frame);
     if (event.record.frame % stride != 0) return;
+    if (event.record.frame == 0) out.surface.times.clear(), out.surface.displacements.clear();
     out.surface.times.push_back(event.state.time);
     out.surface.displacements.push_back(outer_displacement(model.mesh, event.state.u));
   };

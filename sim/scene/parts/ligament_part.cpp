@@ -6,6 +6,7 @@
 
 #include "sim/core/error.h"
 #include "sim/element/basis.h"
+#include "sim/scene/vertex_values.h"
 #include "sim/surface/project_to_surface.h"
 #include "sim/terms/geometry.h"
 #include "sim/terms/ligament_law.h"
@@ -67,6 +68,9 @@ LigamentPart::LigamentPart(const Scene& scene, const SkinMesh& mesh)
     source_positions_.push_back(project_to_surface(inner_, column_triangles_, position).point);
     heat_sources_.push_back({source_positions_.back(), s.radius});
   }
+  if (!scene.ligaments->b_by_vertex.empty())
+    given_map_ = interpolate_vertices(mesh, on_surface_vertices(mesh.surface, scene.ligaments->b_by_vertex,
+                                                                scene.file + ": /ligaments/map"));
 }
 
 void LigamentPart::add_native_blocks(const Scene&, Model& model) const {
@@ -75,7 +79,9 @@ void LigamentPart::add_native_blocks(const Scene&, Model& model) const {
 }
 
 void LigamentPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const {
-  Term term("ligaments", ligament_kernels(), LigamentLaw{});
+  Term term = scene.ligaments->law == LigamentForm::fung_quadratic
+                  ? Term("ligaments", fung_ligament_kernels(), FungLigamentLaw{})
+                  : Term("ligaments", ligament_kernels(), LigamentLaw{});
   TermGroup g = surface_group(model.mesh, SkinSide::inner, triangle_rule(contact_degree(scene)));
   g.rest.clear();
   const int base = model.native_block("ligaments").offset;
@@ -84,7 +90,9 @@ void LigamentPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
              {ThetaSlot::Kind::field, model.native_block("ligaments/b").offset, {}}};
   term.add_group(std::move(g));
   model.terms.push_back(std::move(term));
-  features.push_back({"ligaments", true, std::to_string(source_positions_.size()) + " sources"});
+  features.push_back({"ligaments", true,
+                      given_map_.size() > 0 ? std::string("a map by vertex")
+                                            : std::to_string(source_positions_.size()) + " sources"});
 }
 
 std::shared_ptr<const HeatMapWeights> LigamentPart::heat(double time) const {
@@ -108,6 +116,7 @@ std::size_t LigamentPart::heat_maps_kept() const {
 }
 
 VectorXd LigamentPart::map(const Scene& scene) const {
+  if (given_map_.size() > 0) return scene.ligaments->map_scale * given_map_;
   VectorXd strengths(scene.ligaments->sources.size());
   for (Eigen::Index s = 0; s < strengths.size(); ++s) strengths[s] = scene.ligaments->sources[s].strength;
   return heat(scene.ligaments->diffusion_time)->weights * strengths;
@@ -130,6 +139,10 @@ bool LigamentPart::add_derivative(const Scene& scene, const Model& model, const 
     return true;
   }
   const NativeBlock& b = model.native_block("ligaments/b");
+  if (address == "/ligaments/map_scale") {
+    d.segment(b.offset, b.size) = given_map_;
+    return true;
+  }
   const std::vector<SourceScene>& sources = scene.ligaments->sources;
   if (address == "/ligaments/diffusion_time") {
     const auto weights = heat(scene.ligaments->diffusion_time);

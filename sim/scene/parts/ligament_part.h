@@ -13,7 +13,8 @@ namespace rhytid {
 
 class LigamentPart final : public ScenePart {
  public:
-  /// Places the sources. scene.ligaments must be there. Throws InputError for a vertex outside the crop.
+  /// Places the sources, or reads the map at the vertices. scene.ligaments must be there. Throws InputError
+  /// for a vertex outside the crop, or one without a value.
   LigamentPart(const Scene& scene, const SkinMesh& mesh);
 
   void add_native_blocks(const Scene& scene, Model& model) const override;
@@ -44,6 +45,7 @@ class LigamentPart final : public ScenePart {
   std::vector<Vec3> source_positions_;
   std::vector<HeatSource> heat_sources_;
   std::shared_ptr<HeatCache> heat_cache_;
+  VectorXd given_map_;  ///< b per column before its factor, when the scene gives a map; else empty
 };
 
 }  // namespace rhytid

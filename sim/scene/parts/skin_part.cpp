@@ -1,9 +1,13 @@
 #include "sim/scene/parts/skin_part.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
+#include "sim/core/error.h"
 #include "sim/scene/scene_surface.h"
+#include "sim/scene/vertex_values.h"
 #include "sim/terms/geometry.h"
+#include "sim/terms/pre_stretch_law.h"
 #include "sim/terms/skin_law.h"
 
 namespace rhytid {
@@ -24,13 +28,63 @@ double relaxing_part(const Scene& scene, const LayerScene& l) {
   return scene.time.damper == DamperScheme::none ? 0 : l.relaxing_fraction;
 }
 
+/// The rule in one slab of an element layer of thickness order `order`. `fewer` Gauss points less through it.
+PrismRule slab_rule(const SkinScene& skin, int order, int fewer) {
+  if (skin.prism_degree > 0) return prism_rule(skin.prism_degree);
+  const int degree = skin.triangle_degree > 0 ? skin.triangle_degree : 2 * skin.order + 2;
+  const int points = skin.thickness_points > 0 ? skin.thickness_points : order + 1;
+  return tensor_rule(triangle_rule(std::min(12, degree)), std::max(1, points - fewer));
+}
+
+/// Adds the frame of the pre-stretch at every point: direction in the layer [3] and its normal [3], ∇w
+/// normalised.
+void add_frames(const Scene& scene, TermGroup& g) {
+  const std::optional<Vec3>& direction = scene.skin.pre_stretch->direction;
+  const std::size_t points =
+      static_cast<std::size_t>(g.num_elements) * static_cast<std::size_t>(g.num_points);
+  g.rest.resize(6 * points);
+  for (std::size_t q = 0; q < points; ++q) {
+    const Vec3 n = Eigen::Map<const Vec3>(g.inverse_jacobian.data() + 9 * q + 6).normalized();
+    Vec3 t = n.unitOrthogonal();  // any will do when both stretches are equal
+    if (direction) {
+      const Vec3 d = direction->normalized();
+      t = d - d.dot(n) * n;
+      if (t.norm() < 1e-3)
+        throw InputError(scene.file + ": /skin/pre_stretch/direction",
+                         "a direction at right angles to the skin", "a direction along the skin everywhere");
+      t.normalize();
+    }
+    std::copy(t.data(), t.data() + 3, g.rest.data() + 6 * q);
+    std::copy(n.data(), n.data() + 3, g.rest.data() + 6 * q + 3);
+  }
+}
+
+/// The term without groups: a layer with a Maxwell branch needs history, one without does not.
+Term skin_term(const Scene& scene, bool viscous) {
+  const double volume = scene.skin.volume == VolumeQuadrature::reduced ? 0 : 1;
+  const SkinLaw skin{scene.time.damper, volume};
+  const ElasticSkinLaw elastic{volume};
+  const bool tense = scene.skin.pre_stretch.has_value();
+  if (viscous && tense) return {"skin", pre_stretched_skin_kernels(), PreStretchedLaw<SkinLaw>{skin}};
+  if (viscous) return {"skin", skin_kernels(), skin};
+  if (tense)
+    return {"skin (elastic)", pre_stretched_elastic_skin_kernels(), PreStretchedLaw<ElasticSkinLaw>{elastic}};
+  return {"skin (elastic)", elastic_skin_kernels(), elastic};
+}
+
 }  // namespace
 
-SkinMesh build_skin_mesh(const SkinScene& skin) {
+SkinMesh build_skin_mesh(const Scene& scene) {
+  const SkinScene& skin = scene.skin;
   const TriangleSurface surface = scene_surface(skin.surface);
   ExtrusionOptions options;
   options.order = skin.order;
-  for (const LayerScene& l : skin.layers) options.layers.push_back({l.thickness, l.elements, l.order});
+  for (const LayerScene& l : skin.layers) {
+    options.layers.push_back({l.thickness, l.elements, l.order});
+    if (!l.thickness_by_vertex.empty())
+      options.layers.back().by_vertex = on_surface_vertices(
+          surface, l.thickness_by_vertex, scene.file + ": /skin/layers/" + l.name + "/thickness_map");
+  }
   options.composite = skin.scheme == ThicknessScheme::composite;
   options.composite_order = skin.composite_order;
   options.surface_is_outer = skin.surface.is_outer;
@@ -42,33 +96,51 @@ SkinMesh build_skin_mesh(const SkinScene& skin) {
 void SkinPart::add_native_blocks(const Scene& scene, Model& model) const {
   for (const LayerScene& l : scene.skin.layers)
     add_native_block(model, "layer/" + l.name, 5, {SkinTheta::mu_inf, SkinTheta::bulk, SkinTheta::mu_m});
+  if (scene.skin.pre_stretch) add_native_block(model, "pre_stretch", 2, {});
 }
 
 void SkinPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const {
   const SkinScene& skin = scene.skin;
-  const int degree = skin.triangle_degree > 0 ? skin.triangle_degree : 2 * skin.order + 2;
-  const TriangleRule& rule = triangle_rule(std::min(12, degree));
   // A layer without a Maxwell branch keeps no history and skips its logarithm; a term exists only if a layer
   // needs it.
   for (bool viscous : {true, false}) {
-    Term term = viscous ? Term("skin", skin_kernels(), SkinLaw{scene.time.damper})
-                        : Term("skin (elastic)", elastic_skin_kernels(), ElasticSkinLaw{});
+    Term term = skin_term(scene, viscous);
     for (int k = 0; k < static_cast<int>(model.mesh.element_layers.size()); ++k)
       for (const MaterialSlab& slab : model.mesh.element_layers[k].slabs) {
         const LayerScene& layer = skin.layers[slab.material];
         if ((relaxing_part(scene, layer) > 0) != viscous) continue;
-        const int points =
-            skin.thickness_points > 0 ? skin.thickness_points : model.mesh.element_layers[k].order + 1;
-        TermGroup g = prism_group(model.mesh, k, slab, rule, points);
+        TermGroup g =
+            prism_group(model.mesh, k, slab, slab_rule(skin, model.mesh.element_layers[k].order, 0));
         const int base = model.native_block("layer/" + layer.name).offset;
-        for (int s = 0; s < term.kernels().ntheta; ++s) g.theta.push_back(constant_slot(base + s));
+        const int of_layer = term.kernels().ntheta - (skin.pre_stretch ? 2 : 0);
+        for (int s = 0; s < of_layer; ++s) g.theta.push_back(constant_slot(base + s));
+        if (skin.pre_stretch) {
+          const int stretch = model.native_block("pre_stretch").offset;
+          for (int s = 0; s < 2; ++s) g.theta.push_back(constant_slot(stretch + s));
+          add_frames(scene, g);
+        }
         term.add_group(std::move(g));
       }
     if (!term.groups().empty()) model.terms.push_back(std::move(term));
   }
+  if (skin.volume == VolumeQuadrature::reduced) {
+    Term term("skin volume", volume_kernels(), VolumeLaw{});
+    for (int k = 0; k < static_cast<int>(model.mesh.element_layers.size()); ++k)
+      for (const MaterialSlab& slab : model.mesh.element_layers[k].slabs) {
+        TermGroup g =
+            prism_group(model.mesh, k, slab, slab_rule(skin, model.mesh.element_layers[k].order, 1));
+        const int base = model.native_block("layer/" + skin.layers[slab.material].name).offset;
+        g.theta.push_back(constant_slot(base + SkinTheta::bulk));
+        term.add_group(std::move(g));
+      }
+    model.terms.push_back(std::move(term));
+  }
   const bool any = std::any_of(skin.layers.begin(), skin.layers.end(),
                                [&](const LayerScene& l) { return relaxing_part(scene, l) > 0; });
   features.push_back({"viscosity", any, any ? "Maxwell history at every skin point" : "no layer relaxes"});
+  features.push_back({"pre-stretch", skin.pre_stretch.has_value(),
+                      skin.pre_stretch ? "frame 0 is the relaxed equilibrium under tension"
+                                       : "no /skin/pre_stretch in the scene"});
 }
 
 void SkinPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
@@ -81,10 +153,22 @@ void SkinPart::set_native(const Scene& scene, const Model& model, VectorXd& nati
     native[at + SkinTheta::mu_m] = f * mu;
     native[at + SkinTheta::tau] = l.relaxation_time;
   }
+  if (const auto& tension = scene.skin.pre_stretch) {
+    const int at = model.native_block("pre_stretch").offset;
+    native[at] = tension->stretch;
+    native[at + 1] = tension->across.value_or(tension->stretch);
+  }
 }
 
 bool SkinPart::add_derivative(const Scene& scene, const Model& model, const std::string& address,
                               VectorXd& d) const {
+  if (address == "/skin/pre_stretch/stretch" || address == "/skin/pre_stretch/across") {
+    const int at = model.native_block("pre_stretch").offset;
+    const bool is_across = address.ends_with("across");
+    d[at] = is_across ? 0 : 1;
+    d[at + 1] = is_across || !scene.skin.pre_stretch->across ? 1 : 0;
+    return true;
+  }
   for (const LayerScene& l : scene.skin.layers) {
     const std::string key = key_after(address, "skin/layers", l.name);
     if (key.empty()) continue;

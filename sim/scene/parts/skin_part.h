@@ -1,6 +1,7 @@
 // The skin of a scene: its prism mesh and its layers' elasticity and viscosity.
 //
-// Native block per layer "layer/<name>": μ∞, C, K, μ_m, τ (SkinTheta).
+// Native blocks: per layer "layer/<name>": μ∞, C, K, μ_m, τ (SkinTheta); with a pre-stretch "pre_stretch":
+// λ₁, λ₂.
 #pragma once
 
 #include "sim/scene/parts/scene_part.h"
@@ -8,7 +9,7 @@
 namespace rhytid {
 
 /// The prism mesh of a scene: reads or makes the surface, crops, bends, extrudes. Throws InputError.
-SkinMesh build_skin_mesh(const SkinScene& skin);
+SkinMesh build_skin_mesh(const Scene& scene);
 
 class SkinPart final : public ScenePart {
  public:

@@ -91,8 +91,8 @@ TEST(SceneErrors, NameFileKeyValueAndExpectation) {
        "a.json:20: /ligaments/sources/jaw/vertex: got -1, expected an integer from 0 to 1000000000"},
       // Missing and excluding keys.
       {"\"thickness\": \"2 mm\", ", "",
-       "a.json:11: /skin/layers/soft/thickness: got nothing, expected a length > 0 mm, e.g. \"8 mm\" "
-       "(required)"},
+       "a.json:11: /skin/layers/soft: got neither \"thickness\" nor \"thickness_map\", expected one of the "
+       "two"},
       {"\"vertex\": 7", "\"vertex\": 7, \"position\": [0, 0, 0]",
        "a.json:20: /ligaments/sources/jaw/position: got both \"position\" and \"vertex\", expected one of "
        "the two"},

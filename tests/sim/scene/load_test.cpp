@@ -199,13 +199,13 @@ TEST_F(LoadFiles, ListsOfNamedItemsArePatchedByName) {
   EXPECT_EQ(scene.skin.layers[2].name, "d");
   // An appended item that was meant to be another one lacks what is required.
   EXPECT_THAT(error_of(with_layers(R"({"bb": {"youngs_modulus": 2}, "b": null})")),
-              ::testing::StartsWith(path + ":2: /skin/layers/bb/thickness: got nothing"));
+              ::testing::StartsWith(path + ":2: /skin/layers/bb: got neither \"thickness\""));
   // A list replaces the whole list.
   EXPECT_EQ(
       load_scene(with_layers(R"([{"name": "e", "thickness": 1, "youngs_modulus": 1}])")).skin.layers.size(),
       1u);
   EXPECT_THAT(error_of(with_layers(R"([{"name": "b", "youngs_modulus": 1}])")),
-              ::testing::HasSubstr("/skin/layers/b/thickness: got nothing"));
+              ::testing::HasSubstr("/skin/layers/b: got neither \"thickness\""));
 }
 
 TEST_F(LoadFiles, RefusesCyclesAndMissingFiles) {

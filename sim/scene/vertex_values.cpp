@@ -1,0 +1,126 @@
+#include "sim/scene/vertex_values.h"
+
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "sim/core/error.h"
+
+namespace rhytid {
+namespace {
+
+using nlohmann::json;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr int kMostVertices = 100'000'000;
+
+void set(std::vector<double>& values, const std::string& vertex_text, double value,
+         const std::string& where) {
+  int vertex = -1;
+  const char* end = vertex_text.data() + vertex_text.size();
+  const auto [stop, error] = std::from_chars(vertex_text.data(), end, vertex);
+  if (error != std::errc() || stop != end || vertex < 0 || vertex > kMostVertices)
+    throw InputError(where, "'" + vertex_text.substr(0, 40) + "'", "a vertex number from 0");
+  if (!(value > 0) || !std::isfinite(value))
+    throw InputError(where, std::to_string(value) + " at vertex " + vertex_text, "a number > 0");
+  if (static_cast<std::size_t>(vertex) >= values.size())
+    values.resize(static_cast<std::size_t>(vertex) + 1, kNone);
+  if (!std::isnan(values[static_cast<std::size_t>(vertex)]))
+    throw InputError(where, "vertex " + vertex_text + " a second time", "every vertex once");
+  values[static_cast<std::size_t>(vertex)] = value;
+}
+
+std::string trimmed(const std::string& s) {
+  const auto first = s.find_first_not_of(" \t\r"), last = s.find_last_not_of(" \t\r");
+  return first == std::string::npos ? "" : s.substr(first, last - first + 1);
+}
+
+std::vector<double> from_csv(const std::string& text, const std::string& path) {
+  std::vector<double> values;
+  std::istringstream in(text);
+  std::string line;
+  bool has_header = false;
+  for (int count = 1; std::getline(in, line); ++count) {
+    line = trimmed(line);
+    if (line.empty() || line[0] == '#') continue;
+    const std::string where = path + ":" + std::to_string(count);
+    const auto comma = line.find(',');
+    if (comma == std::string::npos || line.find(',', comma + 1) != std::string::npos)
+      throw InputError(where, "'" + line.substr(0, 60) + "'", "two cells, vertex,value");
+    if (!has_header) {
+      if (trimmed(line.substr(0, comma)) != "vertex")
+        throw InputError(where, "'" + line.substr(0, 60) + "'", "a header that begins with vertex");
+      has_header = true;
+      continue;
+    }
+    const std::string cell = trimmed(line.substr(comma + 1));
+    double value = 0;
+    const char* end = cell.data() + cell.size();
+    const auto [stop, error] = std::from_chars(cell.data(), end, value);
+    if (error != std::errc() || stop != end)
+      throw InputError(where, "'" + cell.substr(0, 40) + "'", "a number > 0");
+    set(values, trimmed(line.substr(0, comma)), value, where);
+  }
+  return values;
+}
+
+std::vector<double> from_json(const std::string& text, const std::string& path) {
+  const json root = json::parse(text, nullptr, false);
+  std::vector<double> values;
+  const auto add = [&](const std::string& vertex, const json& value) {
+    if (value.is_null()) return;
+    if (!value.is_number())
+      throw InputError(path, "a value at vertex " + vertex + " that is no number", "a number");
+    set(values, vertex, value.get<double>(), path);
+  };
+  if (root.is_array()) {
+    for (std::size_t i = 0; i < root.size(); ++i) add(std::to_string(i), root[i]);
+  } else if (root.is_object()) {
+    for (const auto& [vertex, value] : root.items()) add(vertex, value);
+  } else {
+    throw InputError(path, "something else",
+                     "a JSON list of numbers by vertex, or an object of vertex: number");
+  }
+  return values;
+}
+
+}  // namespace
+
+std::vector<double> read_vertex_values(const std::string& path, const std::string& mentioned_at) {
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  if (stream) text << stream.rdbuf();
+  if (!stream || stream.bad()) throw InputError(mentioned_at, path, "a file that can be read");
+  const bool is_json = path.size() > 5 && path.compare(path.size() - 5, 5, ".json") == 0;
+  std::vector<double> values = is_json ? from_json(text.str(), path) : from_csv(text.str(), path);
+  if (values.empty()) throw InputError(mentioned_at, path + ", which has no values", "a value per vertex");
+  return values;
+}
+
+double mean_of_given(const std::vector<double>& values) {
+  double sum = 0;
+  int count = 0;
+  for (const double value : values)
+    if (!std::isnan(value)) sum += value, ++count;
+  return count > 0 ? sum / count : 0;
+}
+
+VectorXd on_surface_vertices(const TriangleSurface& surface, const std::vector<double>& by_file_vertex,
+                             const std::string& where) {
+  VectorXd values(surface.vertices.rows());
+  for (Eigen::Index v = 0; v < values.size(); ++v) {
+    const int source = surface.source_vertex.empty() ? static_cast<int>(v)
+                                                     : surface.source_vertex[static_cast<std::size_t>(v)];
+    const bool is_given = static_cast<std::size_t>(source) < by_file_vertex.size() &&
+                          !std::isnan(by_file_vertex[static_cast<std::size_t>(source)]);
+    if (!is_given)
+      throw InputError(where, "no value for vertex " + std::to_string(source),
+                       "a value for every vertex of the patch");
+    values[v] = by_file_vertex[static_cast<std::size_t>(source)];
+  }
+  return values;
+}
+
+}  // namespace rhytid
