@@ -31,7 +31,9 @@ struct LigamentMap {
     std::vector<HeatSource> kernels;
     for (std::size_t s = 0; s < sources().size(); ++s)
       kernels.push_back({built.source_positions()[s], sources()[s].radius});
-    heat = diffuse_sources(inner, built.column_triangles(), kernels, built.scene().ligaments->diffusion_time);
+    if (!kernels.empty())  // else the scene gives the map itself
+      heat =
+          diffuse_sources(inner, built.column_triangles(), kernels, built.scene().ligaments->diffusion_time);
     b = built.ligament_map(built.scene());
   }
   const std::vector<SourceScene>& sources() const { return scene_model.scene().ligaments->sources; }

@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
+#include <sstream>
 
 #include "sim/core/error.h"
 #include "sim/core/units.h"
@@ -27,20 +29,23 @@ constexpr const char* kParameterUnits[SkinParameters::count] = {"", "MPa", "MPa"
 class Material : public Verb {
  public:
   VerbHelp help() const override {
-    return {"material",
-            "drive one layer's material through a deformation history, without a mesh",
-            "Runs the law of one skin layer at one material point: stress, stored energy and viscous history "
-            "through a "
-            "uniaxial, equibiaxial or shear test, or a history from a file; on request with the derivatives "
-            "of the stress "
-            "by the five parameters. Directions that are not prescribed are traction-free.",
-            "a scene for the layer (optional) and a history as CSV (optional): time_s and F11 to F33, or "
-            "time_s and "
-            "stretch1 (stretch2, stretch3)",
-            "material.csv (times, F, P and Kirchhoff stress in MPa, energy, C^v, derivatives) and "
-            "material.svg; the peak "
-            "and the last stress on stdout",
-            "rhytid material --uniaxial 1.3 --rate '2 Hz' --hold '0.5 s' --derivatives -o run/uniaxial"};
+    return {
+        "material",
+        "drive one layer's material through a deformation history, without a mesh",
+        "Runs the law of one skin layer at one material point: stress, stored energy and viscous history "
+        "through a "
+        "uniaxial, equibiaxial, planar or shear test, or a history from a file; on request with the "
+        "derivatives "
+        "of the stress "
+        "by the five parameters. Directions that are not prescribed are traction-free.",
+        "a scene for the layer (optional) and a history as CSV or JSON (optional): time_s and F11 to F33, or "
+        "time_s and "
+        "stretch1 (stretch2, stretch3)",
+        "material.csv and material.json (times, F, P and Kirchhoff stress in MPa, energy, C^v, derivatives) "
+        "and "
+        "material.svg; the peak "
+        "and the last stress on stdout",
+        "rhytid material --uniaxial 1.3 --rate '2 Hz' --hold '0.5 s' --derivatives -o run/uniaxial"};
   }
   bool takes_file() const override { return false; }
 
@@ -63,8 +68,10 @@ class Material : public Verb {
     group->add_option("--uniaxial", uniaxial_, "stretch to this along 1, sides free")->option_text("STRETCH");
     group->add_option("--equibiaxial", equibiaxial_, "stretch to this along 1 and 2, 3 free")
         ->option_text("STRETCH");
+    group->add_option("--planar", planar_, "stretch to this along 1, 2 held, 3 free (pure shear)")
+        ->option_text("STRETCH");
     group->add_option("--shear", shear_, "simple shear F12 to this amount")->option_text("AMOUNT");
-    group->add_option("--history", history_, "CSV with the history")->option_text("FILE");
+    group->add_option("--history", history_, "CSV or JSON with the history")->option_text("FILE");
     group->require_option(1);
     app.add_option("--rate", rate_, "rate of stretch or shear, e.g. '2 Hz' (default: an instantaneous jump)")
         ->option_text("RATE");
@@ -171,12 +178,18 @@ class Material : public Verb {
       amount = *equibiaxial_ - 1;
       free = {false, false, true};
       target = Vec3(*equibiaxial_, *equibiaxial_, 1).asDiagonal();
+    } else if (planar_) {
+      amount = *planar_ - 1;
+      free = {false, false, true};
+      target = Vec3(*planar_, 1, 1).asDiagonal();
     } else {
       amount = target(0, 1) = shear_.value();
     }
     if (!(target(0, 0) > 0) || !(target.allFinite()))
-      throw InputError(uniaxial_ ? "--uniaxial" : "--equibiaxial", std::to_string(target(0, 0)),
-                       "a stretch > 0");
+      throw InputError(uniaxial_ ? "--uniaxial"
+                       : planar_ ? "--planar"
+                                 : "--equibiaxial",
+                       std::to_string(target(0, 0)), "a stretch > 0");
     double ramp = 0;
     if (!rate_.empty()) {
       const double rate = parse_quantity(rate_, dimension::frequency, "--rate");
@@ -217,6 +230,7 @@ class Material : public Verb {
       for (int k = 0; k < SkinParameters::count; ++k)
         columns.push_back({"d" + loading_name() + "_d_" + SkinParameters::names[k], kParameterUnits[k]});
     CsvTable table(std::move(columns));
+    std::vector<std::vector<double>> rows;
     for (const MaterialPointState& s : run.states) {
       std::vector<double> row{s.time};
       const auto add = [&](const Mat3& m, bool symmetric) {
@@ -232,8 +246,22 @@ class Material : public Verb {
         for (int k = 0; k < SkinParameters::count; ++k)
           row.push_back(s.piola_by_parameter(3 * loading_row() + loading_column(), k));
       table.add_numbers(row);
+      rows.push_back(std::move(row));
     }
     table.write(output_ + "/material.csv");
+    write_json(table.text().substr(0, table.text().find('\n')), rows);
+  }
+
+  /// The same columns as lists, under the names of the CSV header.
+  void write_json(const std::string& header, const std::vector<std::vector<double>>& rows) const {
+    nlohmann::ordered_json lists;
+    std::istringstream names(header);
+    std::string name;
+    for (std::size_t k = 0; std::getline(names, name, ','); ++k) {
+      nlohmann::ordered_json& list = lists[name] = nlohmann::ordered_json::array();
+      for (const std::vector<double>& row : rows) list.push_back(row[k]);
+    }
+    write_file(output_ + "/material.json", lists.dump(1) + "\n");
   }
 
   void write_plot(const MaterialPointRun& run) const {
@@ -272,13 +300,14 @@ class Material : public Verb {
                     1e6 * stress(s), 1e3 * s.energy);
       out << text;
     }
-    out << "written: " << output_ << "/material.csv, " << output_ << "/material.svg\n";
+    out << "written: " << output_ << "/material.csv, " << output_ << "/material.json, " << output_
+        << "/material.svg\n";
   }
 
   std::string scene_, layer_, damper_, history_, rate_, hold_, step_, output_ = "run/material";
   std::vector<std::string> settings_;
   std::map<std::string, std::string> given_;
-  std::optional<double> uniaxial_, equibiaxial_, shear_;
+  std::optional<double> uniaxial_, equibiaxial_, planar_, shear_;
   bool derivatives_ = false;
 };
 

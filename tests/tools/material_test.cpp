@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/LU>
+#include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "sim/core/error.h"
@@ -39,6 +41,29 @@ TEST(MaterialHistory, ReadsStretchesAndDeformationGradients) {
       parse_material_history("F11,F12,F13,F21,F22,F23,F31,F32,F33,time\n1,.5,0,0,1,0,0,0,1,2\n", "h.csv");
   EXPECT_EQ(b.deformation[0](0, 1), 0.5);
   EXPECT_EQ(b.traction_free, (std::array<bool, 3>{}));
+}
+
+TEST(MaterialHistory, JsonListsAreTheSameAsCsv) {
+  const MaterialProgram csv = parse_material_history("time_s,stretch1,stretch2\n0,1,1\n0.5,1.2,1\n", "h.csv");
+  const MaterialProgram json =
+      parse_material_history(R"({"stretch1": [1, 1.2], "time_s": [0, 0.5], "stretch2": [1, 1]})", "h.json");
+  EXPECT_EQ(csv.times, json.times);
+  EXPECT_EQ(csv.deformation, json.deformation);
+  EXPECT_EQ(json.traction_free, (std::array<bool, 3>{false, false, true}));
+  const auto error = [](const std::string& text) {
+    try {
+      (void)parse_material_history(text, "h.json");
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(error("[1"), HasSubstr("a JSON object of lists"));
+  EXPECT_THAT(error(R"({"time_s": [0, 1], "stretch1": [1]})"), HasSubstr("2 numbers"));
+  EXPECT_THAT(error(R"({"time_s": [0], "stretch1": ["1"]})"), HasSubstr("stretch1"));
+  EXPECT_THAT(error(R"({"time_s": [0], "stretch1": [-1]})"), HasSubstr("row 0"));
+  EXPECT_THAT(error(R"({"time_s": [0], "stretch5": [1]})"), HasSubstr("'stretch5'"));
+  EXPECT_THAT(error(R"({"time_s": [], "stretch1": []})"), HasSubstr("at least one row"));
 }
 
 TEST(MaterialHistory, RefusesWithLineAndValue) {
@@ -86,6 +111,26 @@ TEST(MaterialVerb, RunsAndWritesTheClosedForm) {
   std::filesystem::remove_all(folder);
 }
 
+/// Planar (pure shear) of an almost incompressible elastic layer: P11 = 2 μ e^(2 C l²) 2 l/λ · ½ with l = ln
+/// λ, since Ē = diag(l, 0, −l), q = 2 l², and P33 = 0 fixes the pressure.
+TEST(MaterialVerb, PlanarStretchIsTheClosedFormAndJsonHoldsTheColumns) {
+  const std::string folder = testing::TempDir() + "material_planar";
+  const Outcome o = run({"--planar", "1.3", "--youngs-modulus", "3 MPa", "--poissons-ratio", "0.499999",
+                         "--relaxing-fraction", "0", "--derivatives", "-o", folder});
+  ASSERT_EQ(o.code, 0) << o.err;
+  const auto json = nlohmann::json::parse(read_file(folder + "/material.json"));
+  ASSERT_TRUE(json.contains("time_s") && json.contains("P11_MPa") && json.contains("dP11_d_youngs_modulus"));
+  const double l = std::log(1.3), mu = 3 / (2 * 1.499999), q = 2 * l * l;
+  const double p11 = json["P11_MPa"].back(), f22 = json["F22"].back();
+  EXPECT_NEAR(p11, 4 * mu * std::exp(q) * l / 1.3, 2e-5 * p11);
+  EXPECT_EQ(f22, 1);
+  EXPECT_NEAR(json["P33_MPa"].back().get<double>(), 0, 1e-9);
+  EXPECT_GT(std::fabs(json["P22_MPa"].back().get<double>()), 0.1);  // held, not free
+  // Stress is proportional to E at a given ν.
+  EXPECT_NEAR(json["dP11_d_youngs_modulus"].back().get<double>(), p11 / 3, 1e-9 * p11);
+  std::filesystem::remove_all(folder);
+}
+
 TEST(MaterialVerb, TakesTheLayerFromASceneAndFlagsOverIt) {
   const std::string folder = testing::TempDir() + "material_scene", scene = folder + ".json";
   write_file(scene, test::drag_scene(1, 1));
@@ -107,6 +152,7 @@ TEST(MaterialVerb, RefusesBadFlags) {
                                              {"--uniaxial", "1.2", "--shear", "1"},
                                              {"--uniaxial", "0"},
                                              {"--uniaxial", "-1"},
+                                             {"--planar", "0"},
                                              {"--shear", "1", "--rate", "0 Hz"},
                                              {"--shear", "1", "--hold", "3 mm"},
                                              {"--shear", "1", "--poissons-ratio", "0.5"},

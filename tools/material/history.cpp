@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <vector>
 
@@ -44,48 +45,105 @@ double number(const std::string& cell, const std::string& where) {
   return value;
 }
 
-}  // namespace
+/// Columns of numbers, each row with the place it comes from.
+struct HistoryTable {
+  std::string header_place;
+  std::vector<std::string> names;
+  std::vector<std::string> places;         ///< [rows]
+  std::vector<std::vector<double>> cells;  ///< [rows][columns]
+};
 
-MaterialProgram parse_material_history(const std::string& text, const std::string& name) {
-  MaterialProgram program;
-  std::vector<int> meaning;
+HistoryTable read_csv(const std::string& text, const std::string& name) {
+  HistoryTable table;
   std::istringstream in(text);
   std::string line;
   for (int count = 1; std::getline(in, line); ++count) {
     const std::string where = name + ":" + std::to_string(count);
     if (trimmed(line).empty() || trimmed(line)[0] == '#') continue;
     const std::vector<std::string> cells = cells_of(line);
-    if (meaning.empty()) {
-      for (const std::string& c : cells) meaning.push_back(column_meaning(c, where));
-      const auto has = [&](int m) { return std::count(meaning.begin(), meaning.end(), m); };
-      int entries = 0, stretches = 0;
-      for (int m = -1; m < 12; ++m) {
-        if (has(m) > 1) throw InputError(where, "a column twice", "every column once");
-        (m >= 9 ? stretches : entries) += m >= 0 ? static_cast<int>(has(m)) : 0;
-      }
-      if (has(-1) == 0) throw InputError(where, "no time_s", "a column time_s");
-      if (!(entries == 9 && stretches == 0) && !(entries == 0 && stretches > 0))
-        throw InputError(
-            where, std::to_string(entries) + " entries of F and " + std::to_string(stretches) + " stretches",
-            "all nine entries F11 to F33, or one to three stretches");
-      for (int k = 0; k < 3; ++k)
-        program.traction_free[static_cast<std::size_t>(k)] = entries == 0 && has(9 + k) == 0;
+    if (table.names.empty()) {
+      table.names = cells;
+      table.header_place = where;
       continue;
     }
-    if (cells.size() != meaning.size())
+    if (cells.size() != table.names.size())
       throw InputError(where, std::to_string(cells.size()) + " cells",
-                       std::to_string(meaning.size()) + " as in the header");
+                       std::to_string(table.names.size()) + " as in the header");
+    table.places.push_back(where);
+    table.cells.emplace_back();
+    for (const std::string& cell : cells) table.cells.back().push_back(number(cell, where));
+  }
+  return table;
+}
+
+HistoryTable read_json(const std::string& text, const std::string& name) {
+  const nlohmann::json root = nlohmann::json::parse(text, nullptr, false);
+  const auto is_list_of_numbers = [](const nlohmann::json& list) {
+    return list.is_array() &&
+           std::all_of(list.begin(), list.end(), [](const nlohmann::json& x) { return x.is_number(); });
+  };
+  if (!root.is_object())
+    throw InputError(name, "something else",
+                     "a JSON object of lists, {\"time_s\": [...], \"stretch1\": [...]}");
+  HistoryTable table;
+  table.header_place = name;
+  std::size_t rows = 0;
+  for (const auto& [key, list] : root.items()) {
+    if (!is_list_of_numbers(list)) throw InputError(name + ": " + key, "something else", "a list of numbers");
+    if (!table.names.empty() && list.size() != rows)
+      throw InputError(name + ": " + key, std::to_string(list.size()) + " numbers",
+                       std::to_string(rows) + " as in " + table.names[0]);
+    rows = list.size();
+    table.names.push_back(key);
+    table.cells.resize(rows);
+    for (std::size_t i = 0; i < rows; ++i) table.cells[i].push_back(list[i].get<double>());
+  }
+  for (std::size_t i = 0; i < rows; ++i) table.places.push_back(name + ": row " + std::to_string(i));
+  return table;
+}
+
+/// Meaning of every column; fills which directions are free.
+std::vector<int> column_meanings(const HistoryTable& table, MaterialProgram& program) {
+  std::vector<int> meaning;
+  for (const std::string& c : table.names) meaning.push_back(column_meaning(c, table.header_place));
+  const auto has = [&](int m) { return std::count(meaning.begin(), meaning.end(), m); };
+  int entries = 0, stretches = 0;
+  for (int m = -1; m < 12; ++m) {
+    if (has(m) > 1) throw InputError(table.header_place, "a column twice", "every column once");
+    (m >= 9 ? stretches : entries) += m >= 0 ? static_cast<int>(has(m)) : 0;
+  }
+  if (has(-1) == 0) throw InputError(table.header_place, "no time_s", "a column time_s");
+  if (!(entries == 9 && stretches == 0) && !(entries == 0 && stretches > 0))
+    throw InputError(
+        table.header_place,
+        std::to_string(entries) + " entries of F and " + std::to_string(stretches) + " stretches",
+        "all nine entries F11 to F33, or one to three stretches");
+  for (int k = 0; k < 3; ++k)
+    program.traction_free[static_cast<std::size_t>(k)] = entries == 0 && has(9 + k) == 0;
+  return meaning;
+}
+
+}  // namespace
+
+MaterialProgram parse_material_history(const std::string& text, const std::string& name) {
+  const bool is_json = name.ends_with(".json");
+  const HistoryTable table = is_json ? read_json(text, name) : read_csv(text, name);
+  if (table.names.empty()) throw InputError(name, "no rows", "a header and at least one row");
+  MaterialProgram program;
+  const std::vector<int> meaning = column_meanings(table, program);
+  for (std::size_t row = 0; row < table.cells.size(); ++row) {
+    const std::string& where = table.places[row];
     Mat3 f = Mat3::Identity();
     double time = 0, product = 1;
     int prescribed = 0;
-    for (std::size_t k = 0; k < cells.size(); ++k) {
-      const double value = number(cells[k], where);
+    for (std::size_t k = 0; k < meaning.size(); ++k) {
+      const double value = table.cells[row][k];
       if (meaning[k] < 0) {
         time = value;
       } else if (meaning[k] < 9) {
         f(meaning[k] / 3, meaning[k] % 3) = value;
       } else {
-        if (!(value > 0)) throw InputError(where, cells[k], "a stretch > 0");
+        if (!(value > 0)) throw InputError(where, std::to_string(value), "a stretch > 0");
         f(meaning[k] - 9, meaning[k] - 9) = value;
         product *= value;
         ++prescribed;

@@ -1,4 +1,5 @@
-// Deformation histories of a material point as CSV.
+// Deformation histories of a material point as CSV, or as JSON with a list per column: {"time_s": [0, 0.1],
+// ...}.
 //
 //   time_s, F11, F12, ..., F33                                  nine columns: all of F prescribed
 //   time_s, stretch1[, stretch2[, stretch3]]                    the directions that are missing are
@@ -13,8 +14,8 @@
 
 namespace rhytid::tools {
 
-/// Parses the text of a history file; `name` is the file in messages. Throws InputError naming file, line,
-/// value and what was expected.
+/// Parses the text of a history file; `name` is the file in messages, and JSON when it ends with .json.
+/// Throws InputError naming file, line, value and what was expected.
 MaterialProgram parse_material_history(const std::string& text, const std::string& name);
 
 }  // namespace rhytid::tools
