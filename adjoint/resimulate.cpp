@@ -34,7 +34,7 @@ Trajectory resimulate(const Model& model, const VectorXd& native, const Trajecto
       run.failure = "stopped";
       break;
     }
-    StepRecord record{known.step, known.frame, known.bisections, next, std::move(report)};
+    StepRecord record{known.step, known.frame, known.bisections, known.softened, next, std::move(report)};
     if (!keep_history) record.state.history.resize(0);
     current = std::move(next);
     run.steps.push_back(std::move(record));
