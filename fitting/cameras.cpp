@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -250,14 +251,11 @@ Camera read_camera(const std::string& path) {
 }
 
 void write_camera(const Camera& camera, const std::string& path) {
-  // FileStorage chooses the format by the extension, so the temporary name keeps it.
-  const std::filesystem::path target(path);
-  const std::filesystem::path temporary =
-      target.parent_path() / (target.stem().string() + ".partial" + target.extension().string());
+  AtomicPath target(path);
   {
-    cv::FileStorage file;
+    cv::FileStorage file;  // chooses the format by the extension
     try {
-      file.open(temporary.string(), cv::FileStorage::WRITE);
+      file.open(target.path(), cv::FileStorage::WRITE);
     } catch (const cv::Exception&) {
     }
     if (!file.isOpened())
@@ -272,7 +270,7 @@ void write_camera(const Camera& camera, const std::string& path) {
     file << "length_unit"
          << "mm";
   }
-  std::filesystem::rename(temporary, target);
+  target.commit();
 }
 
 }  // namespace rhytid::fitting

@@ -5,7 +5,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <string_view>
@@ -13,6 +12,7 @@
 #include <utility>
 
 #include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -191,32 +191,27 @@ void write_tracks(const TrackSet& set, const std::string& path) {
            std::tie(b.observation->frame, b.track->camera, b.track->id);
   });
 
-  const std::string temporary = path + ".partial";
-  {
-    std::ofstream file(temporary, std::ios::binary);
-    std::string line = header() + "\n";
-    for (const auto& [track, o] : rows) {
-      file << line;
-      line = std::to_string(o->frame) + ",";
-      append(&line, o->time_s);
-      line += "," + std::to_string(track->id) + "," + track->camera;
-      if (o->status == TrackStatus::ok) {
-        for (double value : {o->pixel.x(), o->pixel.y(), o->covariance(0, 0), o->covariance(0, 1),
-                             o->covariance(1, 1), o->correlation}) {
-          require(std::isfinite(value), "write_tracks: an ok observation is not finite");
-          line += ",";
-          append(&line, value);
-        }
-      } else {
-        line += ",,,,,,";
+  AtomicFile file(path);
+  std::string line = header() + "\n";
+  for (const auto& [track, o] : rows) {
+    file.write(line);
+    line = std::to_string(o->frame) + ",";
+    append(&line, o->time_s);
+    line += "," + std::to_string(track->id) + "," + track->camera;
+    if (o->status == TrackStatus::ok) {
+      for (double value : {o->pixel.x(), o->pixel.y(), o->covariance(0, 0), o->covariance(0, 1),
+                           o->covariance(1, 1), o->correlation}) {
+        require(std::isfinite(value), "write_tracks: an ok observation is not finite");
+        line += ",";
+        append(&line, value);
       }
-      line += std::string(",") + to_string(o->status) + "\n";
+    } else {
+      line += ",,,,,,";
     }
-    file << line;
-    file.flush();
-    if (!file) throw InputError(path, "a file that cannot be written", "a writable path with free space");
+    line += std::string(",") + to_string(o->status) + "\n";
   }
-  std::filesystem::rename(temporary, path);
+  file.write(line);
+  file.commit();
 }
 
 }  // namespace rhytid::fitting

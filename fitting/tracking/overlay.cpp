@@ -9,6 +9,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -118,25 +119,20 @@ OverlayReport write_overlay(FrameSource& source, const TrackSet& tracks, const s
   for (const Encoder& encoder :
        {Encoder{"avc1", ".mp4", cv::CAP_FFMPEG}, Encoder{"MJPG", ".avi", cv::CAP_OPENCV_MJPEG}}) {
     const std::string final_path = base.string() + encoder.extension;
-    const std::string temporary = base.string() + ".partial" + encoder.extension;
+    AtomicPath file(final_path);
     cv::VideoWriter writer;
     const char* c = encoder.codec;
-    if (!writer.open(temporary, encoder.back_end, cv::VideoWriter::fourcc(c[0], c[1], c[2], c[3]),
+    if (!writer.open(file.path(), encoder.back_end, cv::VideoWriter::fourcc(c[0], c[1], c[2], c[3]),
                      source.frames_per_second(), canvas.size()) ||
-        !writer.isOpened()) {
-      std::error_code ignored;
-      fs::remove(temporary, ignored);
+        !writer.isOpened())
       continue;
-    }
     OverlayReport report{final_path, encoder.codec, 0};
     for (; frame; frame = source.next()) {
       writer.write(painter.paint(*frame));
       ++report.frames;
     }
     writer.release();
-    if (!fs::exists(temporary) || fs::file_size(temporary) == 0)
-      throw InputError(final_path, "an encoder that wrote nothing", "free space on the disk");
-    fs::rename(temporary, final_path);
+    file.commit();
     return report;
   }
   throw InputError(path, "no working video encoder",

@@ -24,26 +24,47 @@ std::string folder_of(const std::string& path) {
   return slash == 0 ? "/" : path.substr(0, slash);
 }
 
+/// Part of a temporary name that no other writer uses at the same time.
+std::string unique_mark() {
+  static std::atomic<unsigned> counter = 0;
+  return ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+}
+
 /// Opens a new file beside `path` under a name nobody else uses and returns the descriptor, −1 on failure.
 /// mkstemp would do, but makes files private, and widening that needs umask(), which is not thread-safe.
 int open_temporary(const std::string& path, std::string& name) {
-  static std::atomic<unsigned> counter = 0;
   for (int attempt = 0; attempt < 1000; ++attempt) {
-    name = path + ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+    name = path + unique_mark();
     const int descriptor = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor >= 0 || errno != EEXIST) return descriptor;  // EEXIST: left by a killed process
   }
   return -1;
 }
 
+/// Makes a new name itself survive a power cut; some file systems do not support this, which is harmless.
+void flush_folder_of(const std::string& path) {
+  const int folder = open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY);
+  if (folder < 0) return;
+  fsync(folder);
+  close(folder);
+}
+
+[[noreturn]] void fail_at(const std::string& path, const char* what) {
+  throw InputError(path + ": " + what + ": " + std::strerror(errno));
+}
+
+/// rename() onto a folder would fail only after all the work, so look first.
+void require_no_folder(const std::string& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode)) {
+    throw InputError(path + ": cannot write a file here: it is a folder");
+  }
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
-  // rename() onto a folder would fail only after all the work, so look first.
-  struct stat status {};
-  if (stat(path_.c_str(), &status) == 0 && S_ISDIR(status.st_mode)) {
-    throw InputError(path_ + ": cannot write a file here: it is a folder");
-  }
+  require_no_folder(path_);
   descriptor_ = open_temporary(path_, temporary_);
   if (descriptor_ < 0) fail("cannot create the file");
 }
@@ -55,7 +76,7 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::fail(const char* what) const {
-  throw InputError(path_ + ": " + what + ": " + std::strerror(errno));
+  fail_at(path_, what);
 }
 
 void AtomicFile::write(std::string_view bytes) {
@@ -76,12 +97,35 @@ void AtomicFile::commit() {
   if (rename(temporary_.c_str(), path_.c_str()) != 0) fail("cannot rename the finished file");
   close(descriptor_);
   descriptor_ = -1;
-  // Make the new name itself survive a power cut; some file systems do not support this, which is harmless.
-  const int folder = open(folder_of(path_).c_str(), O_RDONLY | O_DIRECTORY);
-  if (folder >= 0) {
-    fsync(folder);
-    close(folder);
-  }
+  flush_folder_of(path_);
+}
+
+AtomicPath::AtomicPath(std::string target) : target_(std::move(target)) {
+  require_no_folder(target_);
+  // The mark goes before the extension, by which encoders choose the container.
+  const auto slash = target_.rfind('/'), dot = target_.rfind('.');
+  const auto stem = slash == std::string::npos ? 0 : slash + 1;
+  const auto end = dot == std::string::npos || dot <= stem ? target_.size() : dot;
+  temporary_ = target_.substr(0, end) + unique_mark() + target_.substr(end);
+}
+
+AtomicPath::~AtomicPath() {
+  if (!temporary_.empty()) unlink(temporary_.c_str());
+}
+
+void AtomicPath::commit() {
+  require(!temporary_.empty(), "AtomicPath: commit twice");
+  const int descriptor = open(temporary_.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) fail_at(target_, "nothing was written");
+  struct stat status {};
+  const bool is_empty = fstat(descriptor, &status) != 0 || status.st_size == 0;
+  const bool is_flushed = fsync(descriptor) == 0;
+  close(descriptor);
+  if (is_empty) throw InputError(target_, "a writer that wrote nothing", "free space on the disk");
+  if (!is_flushed) fail_at(target_, "cannot flush");
+  if (rename(temporary_.c_str(), target_.c_str()) != 0) fail_at(target_, "cannot rename the finished file");
+  temporary_.clear();
+  flush_folder_of(target_);
 }
 
 void write_file(const std::string& path, std::string_view bytes) {

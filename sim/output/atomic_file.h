@@ -30,6 +30,24 @@ class AtomicFile {
   int descriptor_ = -1;
 };
 
+/// The same for writers that open their file themselves and choose its format by the extension, such as video
+/// encoders: they write to path(), which nobody else uses and which ends as the real name does.
+class AtomicPath {
+ public:
+  explicit AtomicPath(std::string target);
+  ~AtomicPath();  ///< removes what was not committed
+  AtomicPath(const AtomicPath&) = delete;
+  AtomicPath& operator=(const AtomicPath&) = delete;
+
+  const std::string& path() const { return temporary_; }
+  /// fsync of the closed file, rename to the target, fsync of the folder. At most once. Throws InputError
+  /// naming the target, also when nothing was written.
+  void commit();
+
+ private:
+  std::string target_, temporary_;
+};
+
 /// Writes a whole file atomically. Throws InputError naming the path; an older file then stays intact.
 void write_file(const std::string& path, std::string_view bytes);
 

@@ -18,7 +18,8 @@ void draw_colour_bar(Image& image, int x, int y, int width, int height, ColourMa
   const int line = std::max(1, static_cast<int>(std::lround(0.5 * scale)));
   const std::vector<double> ticks =
       round_ticks(minimum, maximum, std::clamp(static_cast<int>(height / (22 * scale)), 2, 8));
-  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : maximum - minimum;
+  const double step =
+      ticks.size() > 1 ? ticks[1] - ticks[0] : std::max(maximum - minimum, 1e-6 * std::abs(maximum));
   for (const double tick : ticks) {
     const double at = y + height * (1 - (tick - minimum) / (maximum - minimum));
     const int top = static_cast<int>(std::lround(at - 0.5 * line));

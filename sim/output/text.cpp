@@ -90,6 +90,9 @@ std::vector<double> round_ticks(double low, double high, int target) {
       break;
     }
   }
+  // Apart by round-off only, as in the map of a constant field: there is nothing between, and counting up
+  // would not move on.
+  if (step < 1e-12 * std::max(std::abs(low), std::abs(high))) return {0.5 * (low + high)};
   std::vector<double> ticks;
   const double slack = 1e-9 * step;
   for (double k = std::ceil((low - slack) / step); k * step <= high + slack; k += 1)

@@ -23,7 +23,7 @@ std::string xml_escaped(std::string_view text);
 std::string base64(std::string_view bytes);
 
 /// Round numbers (1, 2 or 5 times a power of ten apart) covering [low, high], about `target` of them, all
-/// inside the range. low < high, both finite.
+/// inside the range; the middle alone when they are apart by round-off only. low < high, both finite.
 std::vector<double> round_ticks(double low, double high, int target);
 
 /// Label of a tick: enough decimals to tell ticks `step` apart, power-of-ten form for very large or small

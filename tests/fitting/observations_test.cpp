@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -56,7 +57,8 @@ TEST_F(TracksFile, ReadsBackTheSameBits) {
     set.tracks.push_back(track);
   }
   write_tracks(set, path_);
-  EXPECT_FALSE(std::filesystem::exists(path_ + ".partial"));
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(path_).parent_path()))
+    EXPECT_EQ(entry.path().filename().string().find("tmp-" + std::to_string(getpid())), std::string::npos);
   const TrackSet back = read_tracks(path_);
   ASSERT_EQ(back.tracks.size(), 3u);
   for (int id = 0; id < 3; ++id) {

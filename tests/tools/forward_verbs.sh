@@ -59,17 +59,17 @@ print(run["exit"]["status"], run["progress"]["frames_done"], len(rows))
 PYTHON
 }
 
-expect 0 0 'left out: no layer relaxes' check tiny.json --set /skin/layers/soft/relaxing_fraction=0
-expect 0 0 'residual at rest +0 N' check tiny.json
-expect 0 0 '"memory_MB"' check tiny.json --json
+expect 0 0 '^  viscosity +left out: no layer relaxes$' check tiny.json --set /skin/layers/soft/relaxing_fraction=0
+expect 0 0 '^  residual at rest +0 N, exactly an equilibrium$' check tiny.json
+expect 0 0 '^ +"unknowns": 135,$' check tiny.json --json
 /usr/bin/env python3 -c 'import json; json.load(open("out.txt"))' || fail "check --json is not JSON"
-expect 2 1 'no_such.json' check no_such.json
-expect 2 1 'tiny.json:[0-9]+: /skin/layers/0/thicknes|thickness' check tiny.json --set /skin/layers/soft/thicknes=1
-expect 2 1 '/ligaments' heatmap "$source/data/scenes/elastic_patch/scene.json"
-expect 2 1 '--set /skin/surface/file=PATH' check "$source/data/scenes/head_forehead/scene.json"
-expect 2 1 '--output' simulate tiny.json -o /dev/null/x
+expect 2 1 '^rhytid: error: no_such.json: got no_such.json, which does not exist, expected a readable scene file$' check no_such.json
+expect 2 1 '^rhytid: error: tiny.json \(--set\): /skin/layers/soft/thicknes: got .*, nearest is "thickness"$' check tiny.json --set /skin/layers/soft/thicknes=1
+expect 2 1 'elastic_patch/scene.json: /ligaments: got nothing, expected ligaments with at least one source$' heatmap "$source/data/scenes/elastic_patch/scene.json"
+expect 2 1 '^rhytid: error: .*head_forehead/give the mesh by --set /skin/surface/file=PATH: cannot be opened' check "$source/data/scenes/head_forehead/scene.json"
+expect 2 1 "^rhytid: error: --output: got '/dev/null/x' .*, expected a folder that can be written$" simulate tiny.json -o /dev/null/x
 
-expect 0 any 'written to run_a' simulate tiny.json -o run_a "${small[@]}"
+expect 0 any '^written to run_a: run.json, steps.csv' simulate tiny.json -o run_a "${small[@]}"
 [ "$(whole run_a)" = "complete 4 5" ] || fail "run_a: $(whole run_a)"
 [ "$(ls run_a/frames run_a/surface run_a/pictures | grep -c frame_)" = 10 ] || fail "frames of run_a"
 [ "$(ls run_a/pictures | wc -l)" = 10 ] || fail "pictures of run_a"
@@ -79,7 +79,8 @@ for python in /usr/bin/python3 python3; do
   code=$?
   [ $code = 77 ] || break
 done
-[ $code = 0 ] || [ $code = 77 ] || fail "read back with VTK: $(cat vtk.txt)"
+[ $code = 77 ] && [ "${RHYTID_REQUIRE_CHECKS:-0}" = 0 ] && code=0
+[ $code = 0 ] || fail "read back with VTK: $(cat vtk.txt)"
 
 # Every second frame and the last; table and pictures off.
 expect 0 any 'written to' simulate tiny.json -o run_b "${small[@]}" --set /time/frames=3 --set /output/every=2 \
@@ -102,8 +103,8 @@ wait $pid
 code=$?
 [ "$code" = 4 ] || fail "interrupted run: exit $code: $(cat err.txt)"
 case "$(whole run_e)" in interrupted\ [2-9]*) ;; *) fail "run_e: $(whole run_e)" ;; esac
-expect 2 1 'different scene' simulate tiny.json -o run_e "${small[@]}" --resume --set /base/stiffness=2
-expect 0 any 'resumed after frame' simulate tiny.json -o run_e "${small[@]}" --resume --set /time/frames=12
+expect 2 1 '^rhytid: error: run_e/state.bin: got the state of a different scene, ' simulate tiny.json -o run_e "${small[@]}" --resume --set /base/stiffness=2
+expect 0 any 'resumed after frame [2-9]' simulate tiny.json -o run_e "${small[@]}" --resume --set /time/frames=12
 [ "$(whole run_e)" = "complete 12 13" ] || fail "resumed run_e: $(whole run_e)"
 for file in steps.csv frames.pvd surface.pvd state.bin frames/frame_0012.vtu surface/frame_0012.vtp; do
   cmp -s run_d/$file run_e/$file || fail "$file differs after a resume"

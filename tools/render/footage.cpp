@@ -1,19 +1,14 @@
 #include "tools/render/footage.h"
 
-#include <filesystem>
 #include <opencv2/imgproc.hpp>
 
 #include "sim/core/error.h"
 
 namespace rhytid::tools {
 
-namespace fs = std::filesystem;
-
 FootageWriter::FootageWriter(std::string path, const std::string& codec, double frames_per_second, int width,
                              int height)
-    : path_(std::move(path)) {
-  const fs::path target(path_);
-  temporary_ = (target.parent_path() / target.stem()).string() + ".partial" + target.extension().string();
+    : path_(std::move(path)), file_(path_) {
   const bool is_jpeg = codec == "mjpg";
   if (!is_jpeg && (width % 2 != 0 || height % 2 != 0))
     throw InputError(path_, std::to_string(width) + " x " + std::to_string(height) + " px",
@@ -21,15 +16,9 @@ FootageWriter::FootageWriter(std::string path, const std::string& codec, double 
   const int code =
       is_jpeg ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G') : cv::VideoWriter::fourcc('a', 'v', 'c', '1');
   const int back_end = is_jpeg ? cv::CAP_OPENCV_MJPEG : cv::CAP_FFMPEG;
-  if (!writer_.open(temporary_, back_end, code, frames_per_second, {width, height}) || !writer_.isOpened())
+  if (!writer_.open(file_.path(), back_end, code, frames_per_second, {width, height}) || !writer_.isOpened())
     throw InputError(path_, "no working encoder for " + codec, "a writable folder and OpenCV with FFmpeg");
   if (is_jpeg) writer_.set(cv::VIDEOWRITER_PROP_QUALITY, 98);
-}
-
-FootageWriter::~FootageWriter() {
-  writer_.release();
-  std::error_code ignored;
-  if (!temporary_.empty()) fs::remove(temporary_, ignored);
 }
 
 void FootageWriter::add(const Image& rgb) {
@@ -42,11 +31,7 @@ void FootageWriter::add(const Image& rgb) {
 
 void FootageWriter::commit() {
   writer_.release();
-  std::error_code error;
-  if (!fs::exists(temporary_, error) || fs::file_size(temporary_, error) == 0)
-    throw InputError(path_, "an encoder that wrote nothing", "free space on the disk");
-  fs::rename(temporary_, path_);
-  temporary_.clear();
+  file_.commit();
 }
 
 }  // namespace rhytid::tools

@@ -55,6 +55,37 @@ TEST(AtomicFile, LeavesNothingWithoutCommit) {
   EXPECT_EQ(folder.num_files(), 0u);
 }
 
+TEST(AtomicPath, KeepsTheExtensionAndAppearsOnCommit) {
+  const TemporaryFolder folder;
+  const std::string target = folder / "film.x/a.b.avi";
+  std::filesystem::create_directory(folder / "film.x");
+  std::string one, two;
+  {
+    AtomicPath first(target), second(target);
+    one = first.path(), two = second.path();
+    EXPECT_NE(one, two);
+    EXPECT_EQ(std::filesystem::path(one).extension(), ".avi");
+    EXPECT_EQ(std::filesystem::path(one).parent_path(), std::filesystem::path(target).parent_path());
+    std::ofstream(one) << "one";
+    std::ofstream(two) << "two";
+    EXPECT_FALSE(std::filesystem::exists(target));
+    first.commit();
+    EXPECT_EQ(read_file(target), "one");
+  }
+  EXPECT_FALSE(std::filesystem::exists(one) || std::filesystem::exists(two));
+  EXPECT_EQ(read_file(target), "one") << "what was not committed is dropped";
+  AtomicPath nothing(target), empty(target);
+  EXPECT_THROW(nothing.commit(), InputError);
+  { const std::ofstream touched(empty.path()); }
+  EXPECT_THROW(empty.commit(), InputError);
+  EXPECT_THROW(AtomicPath(folder / "film.x"), InputError);
+  EXPECT_EQ(std::filesystem::path(AtomicPath(folder / "film.x/plain").path())
+                .extension()
+                .string()
+                .rfind(".tmp-", 0),
+            0u);
+}
+
 TEST(AtomicFile, NamesThePathOnFailure) {
   const TemporaryFolder folder;
   const std::string missing = folder / "no/such/folder/x.csv";
@@ -122,6 +153,7 @@ TEST(Text, TicksAreRoundAndInside) {
     for (const double tick : many)
       EXPECT_TRUE(tick >= 0.37 * span * (1 - 1e-9) && tick <= 1.37 * span * (1 + 1e-9));
   }
+  EXPECT_THAT(round_ticks(1.5 - 3e-16, 1.5, 5), ElementsAre(testing::DoubleEq(1.5)));
   EXPECT_THROW(round_ticks(1, 1, 5), ContractError);
 }
 
