@@ -1,6 +1,7 @@
 #include "fitting/case_rules.h"
 
 #include "fitting/case.h"
+#include "sim/scene/schema.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -17,6 +18,9 @@ std::vector<Rule> file_rules() {
        .fallback = nlohmann::json::array(),
        .doc = "Changes of that scene, \"/pointer=value\"."},
       {.pointer = "/settings/*", .type = RuleType::string},
+      {.pointer = "/camera", .type = RuleType::path, .doc = "OpenCV camera; default: the automatic one."},
+      {.pointer = "/footage", .type = RuleType::string, .fallback = "", .doc = "Video file."},
+      {.pointer = "/tracks", .type = RuleType::string, .fallback = "", .doc = "Observations, CSV."},
       {.pointer = "/truth", .type = RuleType::object, .doc = "What made the footage of a twin experiment."},
       {.pointer = "/truth/scene", .type = RuleType::path, .doc = "Scene; default: that of the fit."},
       {.pointer = "/truth/settings",
@@ -24,9 +28,6 @@ std::vector<Rule> file_rules() {
        .fallback = nlohmann::json::array(),
        .doc = "Changes of the truth's scene."},
       {.pointer = "/truth/settings/*", .type = RuleType::string},
-      {.pointer = "/camera", .type = RuleType::path, .doc = "OpenCV camera; default: the automatic one."},
-      {.pointer = "/footage", .type = RuleType::string, .fallback = "", .doc = "Video file."},
-      {.pointer = "/tracks", .type = RuleType::string, .fallback = "", .doc = "Observations, CSV."},
   };
 }
 
@@ -125,7 +126,11 @@ std::vector<Rule> fit_rules() {
        .min = 1,
        .max = 1000000},
       {.pointer = "/fit/robust_scale", .fallback = c.robust_scale, .min = 0},
-      {.pointer = "/fit/min_sigma", .fallback = c.min_sigma, .min = 0, .min_is_open = true},
+      {.pointer = "/fit/min_sigma",
+       .fallback = c.min_sigma,
+       .min = 0,
+       .min_is_open = true,
+       .doc = "Floor of the standard deviation of a displacement since frame 0, px."},
       {.pointer = "/fit/first_frame",
        .type = RuleType::integer,
        .fallback = c.first_frame,
@@ -141,17 +146,39 @@ std::vector<Rule> fit_rules() {
   };
 }
 
+constexpr const char* introduction = R"(# The case file
+
+<!-- Generated from the rules table by `rhytid schema case --docs`; edit the table instead. -->
+
+Everything that one identification needs besides the scene: where footage, tracks and camera are, how footage is
+rendered and tracked, which parameters are fitted. Comments, units, `extends`, paths and `--set` work as in scene
+files (`rhytid schema --docs`). Parameters are addressed by the JSON pointer of their value in the scene, list items
+by name or number: `/skin/layers/film/youngs_modulus`; what is left out of `fit/parameters/*` comes from the scene.
+)";
+
 }  // namespace
 
-const RuleNode& case_rule_tree() {
+const std::vector<Rule>& case_rules() {
   static const std::vector<Rule> rules = [] {
     std::vector<Rule> all;
     for (std::vector<Rule> (*group)() : {&file_rules, &render_rules, &track_rules, &fit_rules})
       for (Rule& rule : group()) all.push_back(std::move(rule));
     return all;
   }();
-  static const RuleNode root = build_rule_tree(rules);
+  return rules;
+}
+
+const RuleNode& case_rule_tree() {
+  static const RuleNode root = build_rule_tree(case_rules());
   return root;
+}
+
+nlohmann::json case_schema() {
+  return format_schema(case_rule_tree(), "case");
+}
+
+std::string case_documentation() {
+  return format_documentation(case_rules(), case_rule_tree(), "case", introduction);
 }
 
 }  // namespace rhytid::fitting

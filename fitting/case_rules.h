@@ -6,7 +6,13 @@
 
 namespace rhytid::fitting {
 
-/// All rules of case files as a tree.
+/// All rules of case files, and as a tree.
+const std::vector<Rule>& case_rules();
 const RuleNode& case_rule_tree();
+
+/// JSON Schema (draft 2020-12) of case files, for editors.
+nlohmann::json case_schema();
+/// The case format as Markdown.
+std::string case_documentation();
 
 }  // namespace rhytid::fitting

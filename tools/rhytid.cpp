@@ -1,6 +1,7 @@
 // The full program: simulate, track, fit, report.
 #include <iostream>
 
+#include "fitting/case_rules.h"
 #include "tools/all_verbs.h"
 #include "tools/environment.h"
 
@@ -13,5 +14,6 @@ int main(int argc, char** argv) {
       "video.";
   program.verbs = make_all_verbs();
   program.environment_checks = {fitting_environment};
+  program.formats = {{"case", rhytid::fitting::case_schema, rhytid::fitting::case_documentation}};
   return run_program(program, argc, argv, std::cout, std::cerr);
 }

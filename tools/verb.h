@@ -5,6 +5,7 @@
 #include <functional>
 #include <iosfwd>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,13 @@ struct EnvironmentFact {
   enum class Verdict { fact, good, bad };
   std::string name, value;
   Verdict verdict = Verdict::fact;
+};
+
+/// A kind of file, for schema.
+struct FileFormat {
+  std::string name;                             ///< "case"
+  std::function<nlohmann::json()> json_schema;  ///< draft 2020-12
+  std::function<std::string()> documentation;   ///< Markdown
 };
 
 struct Program;
@@ -81,6 +89,8 @@ struct Program {
   std::vector<std::unique_ptr<Verb>> verbs;
   /// What doctor reports beyond the simulator's own libraries.
   std::vector<std::function<std::vector<EnvironmentFact>()>> environment_checks;
+  /// Formats that schema prints beside that of scenes.
+  std::vector<FileFormat> formats = {};
 };
 
 /// Parses the command line, runs the verb, turns every outcome into an exit code and at most one line on

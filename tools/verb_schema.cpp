@@ -1,7 +1,9 @@
-// rhytid schema: the scene format, for editors and for people.
+// rhytid schema: the formats of files, for editors and for people.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <ostream>
 
+#include "sim/core/error.h"
 #include "sim/scene/load.h"
 #include "tools/verb.h"
 
@@ -11,30 +13,42 @@ namespace {
 class Schema : public Verb {
  public:
   VerbHelp help() const override {
-    return {
-        "schema",
-        "print the scene format as JSON Schema, or as documentation",
-        "Prints the format of scene files. Validation, this schema and the documentation come from the same "
-        "table of rules, so they agree. Give the schema to an editor for completion and checks while typing.",
-        "nothing",
-        "JSON Schema (draft 2020-12) on stdout; Markdown with --docs",
-        "rhytid schema > scene.schema.json"};
+    return {"schema",
+            "print the format of scenes or cases as JSON Schema, or as documentation",
+            "Prints the format of scene files, or of case files ('schema case', in the program that fits). "
+            "Validation, this schema and the documentation come from the same table of rules, so they agree. "
+            "Give "
+            "the schema to an editor for completion and checks while typing.",
+            "nothing",
+            "JSON Schema (draft 2020-12) on stdout; Markdown with --docs",
+            "rhytid schema > scene.schema.json"};
   }
   bool takes_file() const override { return false; }
   void add_options(CLI::App& app) override {
+    app.add_option("format", format_, "scene (default) or case")->option_text("FORMAT");
     app.add_flag("--docs", as_documentation_, "the format as Markdown: every key, unit, range and default");
   }
 
   ExitCode run(VerbContext& context) override {
+    std::vector<FileFormat> formats = {{"scene", scene_schema, scene_documentation}};
+    formats.insert(formats.end(), context.program.formats.begin(), context.program.formats.end());
+    const auto chosen = std::find_if(formats.begin(), formats.end(),
+                                     [this](const FileFormat& f) { return f.name == format_; });
+    if (chosen == formats.end()) {
+      std::string names;
+      for (const FileFormat& f : formats) names += (names.empty() ? "" : ", ") + f.name;
+      throw InputError("schema", "'" + format_ + "'", "one of " + names);
+    }
     if (as_documentation_) {
-      context.out << scene_documentation();
+      context.out << chosen->documentation();
     } else {
-      context.out << scene_schema().dump(2) << '\n';
+      context.out << chosen->json_schema().dump(2) << '\n';
     }
     return ExitCode::ok;
   }
 
  private:
+  std::string format_ = "scene";
   bool as_documentation_ = false;
 };
 

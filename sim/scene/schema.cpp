@@ -1,8 +1,9 @@
 // JSON Schema and Markdown from the rules table.
+#include <cctype>
 #include <cmath>
 
 #include "sim/scene/load.h"
-#include "sim/scene/rules.h"
+#include "sim/scene/schema.h"
 
 namespace rhytid {
 namespace {
@@ -203,34 +204,38 @@ Paths given there are relative to the working directory. In the tables `*` stand
 
 }  // namespace
 
-json scene_schema() {
+json format_schema(const RuleNode& rules, const std::string& name) {
   const json extends = {
-      {"type", "string"}, {"minLength", 1}, {"description", "The scene file to start from."}};
-  json patch = node_schema(scene_rule_tree(), true);
+      {"type", "string"}, {"minLength", 1}, {"description", "The " + name + " file to start from."}};
+  json patch = node_schema(rules, true);
   patch["properties"]["extends"] = extends;
   return {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
-          {"title", "Rhytid scene"},
+          {"title", "Rhytid " + name},
           {"description", "Plain numbers are in mm, N, MPa, s; strings carry a unit."},
-          {"$defs", {{"scene", node_schema(scene_rule_tree(), false)}, {"patch", patch}}},
+          {"$defs", {{name, node_schema(rules, false)}, {"patch", patch}}},
           {"if", {{"type", "object"}, {"required", json::array({"extends"})}}},
           {"then", {{"$ref", "#/$defs/patch"}}},
-          {"else", {{"$ref", "#/$defs/scene"}}}};
+          {"else", {{"$ref", "#/$defs/" + name}}}};
 }
 
-std::string scene_documentation() {
-  std::string text = introduction;
+std::string format_documentation(const std::vector<Rule>& rules, const RuleNode& tree,
+                                 const std::string& name, const std::string& introduction) {
+  std::string text = introduction, title = name;
+  title[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(title[0])));
   const std::string header =
       "| key | type | unit | range | default | meaning |\n| --- | --- | --- | --- | --- | --- |\n";
   std::string section = "(none)";
-  for (const Rule& rule : scene_rules()) {
+  for (const Rule& rule : rules) {
     if (rule.pointer.empty()) continue;
     const size_t second = rule.pointer.find('/', 1);
+    const RuleNode& top = *tree.child(rule.pointer.substr(1, second - 1));
+    const RuleNode* item = top.child("*");  // lists of plain values need no section
     const bool has_children =
-        scene_rule_tree().child(rule.pointer.substr(1, second - 1))->children.size() > 0;
+        !top.children.empty() && (item == nullptr || item->rule->type == RuleType::object);
     const std::string wanted = has_children ? rule.pointer.substr(1, second - 1) : "";
     if (wanted != section) {
       section = wanted;
-      text += "\n## " + (section.empty() ? std::string("Scene") : "`" + section + "`") + "\n\n" + header;
+      text += "\n## " + (section.empty() ? title : "`" + section + "`") + "\n\n" + header;
     }
     text += "| `" + rule.pointer + "` | " + cell(type_text(rule)) + " | " + unit_text(rule.dimension) +
             " | " + (rule.type == RuleType::array ? (rule.min > 0 ? "at least 1" : "") : range_text(rule)) +
@@ -238,6 +243,14 @@ std::string scene_documentation() {
             (rule.needs.empty() ? "" : " Only with `" + rule.needs + "`.") + " |\n";
   }
   return text;
+}
+
+json scene_schema() {
+  return format_schema(scene_rule_tree(), "scene");
+}
+
+std::string scene_documentation() {
+  return format_documentation(scene_rules(), scene_rule_tree(), "scene", introduction);
 }
 
 }  // namespace rhytid
