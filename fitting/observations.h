@@ -4,7 +4,16 @@
 //   frame,time_s,track_id,camera,x_px,y_px,sxx_px2,sxy_px2,syy_px2,corr,status
 // status ok: all numbers present and finite, covariance positive definite, −1 <= corr <= 1.
 // any other status: the six number columns x_px ... corr are empty, because nothing was measured.
-// Numbers are written so that reading gives back the same bits. Tests: tests/fitting/observations_test.cpp
+// Numbers are written so that reading gives back the same bits.
+//
+// What the covariances contain. The first ok observation of a track says which material point it is, and its
+// error o is shared by all later ones; e_f is what observation f errs by itself:
+//   pixel_f = projection of the point in frame f + o + e_f,   o ~ N(0, covariance of the first),
+//                                                             e_f ~ N(0, covariance of f), independent
+// So a displacement since the first observation has the sum of both covariances, and one between two later
+// frames f and g that of f and g. Independent errors in all frames are the case where the first is like the
+// others. The tracker puts the noise of the template into the first observation, since it is common to all
+// frames. Tests: tests/fitting/observations_test.cpp
 #pragma once
 
 #include <string>
@@ -29,8 +38,9 @@ struct Observation {
   int frame = 0;      ///< index in the footage, from 0
   double time_s = 0;  ///< s
   TrackStatus status = TrackStatus::lost;
-  Vec2 pixel = Vec2::Zero();                                 ///< position, px; meaningful only when ok
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();  ///< of pixel, px²; meaningful only when ok
+  Vec2 pixel = Vec2::Zero();  ///< position, px; meaningful only when ok
+  /// Of the observation's own error, or, in the first, of what is common to the track; px²; only when ok.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
   double correlation = 0;  ///< zero-mean normalised correlation with the track's template; only when ok
 };
 

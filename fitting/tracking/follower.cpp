@@ -158,6 +158,7 @@ void accept(const Measurement& m, const ResidualCorrelation& correlation, const 
             Follower* f) {
   if (m.from_previous) {
     f->inherited = f->covariance;
+    f->renewed = f->renewed || f->common.has_value();  // a template cut in the first frame is the first again
     f->template_gradient = f->warp.gradient * f->template_gradient;
     f->patch = m.new_patch;
     f->baseline = 0;
@@ -166,8 +167,14 @@ void accept(const Measurement& m, const ResidualCorrelation& correlation, const 
   f->correlation = m.alignment.correlation;
   if (f->baseline == 0) f->baseline = std::max(f->residual, view.least_residual);
   f->warp = m.alignment.warp;
-  f->covariance =
-      f->inherited + correlation.covariance(m.alignment, std::max(f->residual, view.least_residual));
+  // Half of the residual's noise is the template's, which all frames share, half the frame's own. The
+  // position of a renewed template is as uncertain as the frame it was cut from, and its noise counts as the
+  // frames' own.
+  const Eigen::Matrix2d both =
+      correlation.covariance(m.alignment, std::max(f->residual, view.least_residual));
+  if (!f->common) f->common = 0.5 * both;
+  f->with_itself.reset();
+  f->covariance = f->renewed ? Eigen::Matrix2d(f->inherited + both) : Eigen::Matrix2d(0.5 * both);
   f->active = true;
 }
 

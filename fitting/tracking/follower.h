@@ -2,6 +2,8 @@
 // Used by tracker.cpp only.
 #pragma once
 
+#include <optional>
+
 #include "fitting/tracking/optical_flow.h"
 #include "fitting/tracking/patch_alignment.h"
 #include "fitting/tracking/tracker.h"
@@ -16,10 +18,14 @@ struct Follower {
   bool active = true;        ///< ok in the last frame
   PatchTemplate patch;
   PatchWarp warp;
-  Eigen::Matrix2d inherited = Eigen::Matrix2d::Zero();  ///< covariance of the template's own position, px²
+  /// Covariance of what all frames err alike: the noise of the first template as its alignments felt it, px².
+  std::optional<Eigen::Matrix2d> common;
+  std::optional<Alignment> with_itself;                 ///< of the first template, until `common` is known
+  Eigen::Matrix2d inherited = Eigen::Matrix2d::Zero();  ///< own covariance when the template was renewed, px²
+  bool renewed = false;                                 ///< the template is not of the first frame
   Eigen::Matrix2d template_gradient =
       Eigen::Matrix2d::Identity();                       ///< deformation from first frame to template
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< total, in the last ok frame, px²
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< own, in the last ok frame, px²
   double baseline = 0;     ///< first residual against this template, grey; 0 = none yet
   double correlation = 1;  ///< of the last accepted alignment
   double residual = 0;     ///< last accepted residual, grey

@@ -32,7 +32,7 @@ NoiseFloor measure_noise_floor(const TrackSet& tracks, int first_frame, int last
     std::vector<Sample> samples;
     for (const Observation& o : t.observations) {
       if (o.frame <= first_frame || o.frame > last_frame || o.status != TrackStatus::ok) continue;
-      samples.push_back({o.frame, o.pixel - start->pixel, o.covariance});
+      samples.push_back({o.frame, o.pixel - start->pixel, start->covariance + o.covariance});
     }
     if (samples.size() < 3) continue;
     for (const Sample& s : samples)

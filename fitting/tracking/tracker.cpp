@@ -95,7 +95,7 @@ class Run {
       f.track.id = static_cast<int>(followers_.size());
       f.track.camera = o_.camera;
       f.seed = f.warp.centre = seed;
-      f.covariance = least_residual_ * least_residual_ * self.unit_covariance;
+      f.with_itself = self;
       followers_.push_back(std::move(f));
     }
     if (followers_.empty())
@@ -237,6 +237,7 @@ class Run {
       if (fresh.values.empty()) continue;
       f.patch = std::move(fresh);
       f.inherited = f.covariance;
+      f.renewed = true;
       f.template_gradient = f.warp.gradient * f.template_gradient;
       f.warp.gradient.setIdentity();
       f.baseline = 0;
@@ -301,15 +302,19 @@ class Run {
   TrackerResult finish() {
     TrackerResult result;
     std::vector<double> sigmas;
+    const double typical = std::max(quantile(&all_residuals_, 0.5), least_residual_);
+    report_.noise_grey = quantile(&all_residuals_, 0.5) / std::sqrt(2.0);
     for (Follower& f : followers_) {
       auto& list = f.track.observations;
-      // The first position is the definition of the material point. It shares the template's noise with the
-      // second and is given its covariance.
-      if (list.size() > 1 && list[1].status == TrackStatus::ok) list[0].covariance = list[1].covariance;
+      // The first position is the definition of the material point; what it errs by is common to all frames.
+      // A point that was never seen again has no residuals of its own and is given typical ones.
+      if (!f.common) f.common = 0.5 * correlation_.covariance(*f.with_itself, typical);
+      list[0].covariance = *f.common;
       bool unbroken = true;
       for (const Observation& o : list) {
         unbroken = unbroken && o.status == TrackStatus::ok;
-        if (o.status == TrackStatus::ok) sigmas.push_back(std::sqrt(o.covariance.trace() / 2));
+        if (&o != list.data() && o.status == TrackStatus::ok)
+          sigmas.push_back(std::sqrt((*f.common + o.covariance).trace() / 2));
       }
       report_.kept += f.active;
       report_.unbroken += unbroken;
@@ -321,7 +326,6 @@ class Run {
     }
     report_.forward_backward_median_px = quantile(&all_errors_, 0.5);
     report_.forward_backward_95_px = quantile(&all_errors_, 0.95);
-    report_.noise_grey = quantile(&all_residuals_, 0.5) / std::sqrt(2.0);
     report_.sigma_median_px = quantile(&sigmas, 0.5);
     result.report = std::move(report_);
     return result;

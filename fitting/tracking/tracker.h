@@ -102,8 +102,8 @@ struct TrackerReport {
   int redetected = 0;
   double forward_backward_median_px = 0;  ///< over all accepted measurements
   double forward_backward_95_px = 0;
-  double noise_grey = 0;                     ///< per smoothed image: median residual / √2
-  double sigma_median_px = 0;                ///< median of sqrt(trace(covariance)/2)
+  double noise_grey = 0;       ///< per smoothed image: median residual / √2
+  double sigma_median_px = 0;  ///< of displacements since the first frame: median of sqrt(trace/2)
   std::array<int, kNumRefusals> refusals{};  ///< times a track was refused, by Refusal
   std::vector<FrameCounts> frames;
 };

@@ -48,7 +48,8 @@ json track_record(const fitting::TrackerReport& report, const std::optional<Trac
                                      {"gross", e.gross},
                                      {"inlier_rms_px", e.inlier_rms_px},
                                      {"last_frame_rms_px", e.last_frame_rms_px},
-                                     {"normalised", e.normalised}};
+                                     {"normalised", e.normalised},
+                                     {"reduced_chi_square", e.reduced_chi_square}};
   }
   return record;
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <vector>
 
+#include "fitting/track_noise.h"
 #include "tools/render/skin_renderer.h"
 #include "tools/render/surface_view.h"
 
@@ -15,7 +16,7 @@ using fitting::Observation;
 using fitting::TrackStatus;
 
 TrackingError tracking_error(const fitting::TrackSet& tracks, const MovingSurface& truth,
-                             const fitting::Camera& camera) {
+                             const fitting::Camera& camera, const fitting::FitCase& noise) {
   const SubdividedSurface tessellation(truth.mesh, SurfaceSide::outer, subdivision_for(truth, camera, 3));
   std::map<int, SurfaceView> views;  // of the frames in which tracks begin
   const auto view_of = [&](int frame) -> const SurfaceView& {
@@ -24,7 +25,7 @@ TrackingError tracking_error(const fitting::TrackSet& tracks, const MovingSurfac
   TrackingError out;
   std::vector<double> distances;
   std::map<int, std::pair<double, int>> by_frame;  // sum of squares, count
-  double chi = 0;
+  double chi = 0, whitened = 0;
   for (const fitting::Track& track : tracks.tracks) {
     if (track.camera != camera.name) continue;
     const auto is_ok = [&truth](const Observation& o) {
@@ -38,15 +39,24 @@ TrackingError tracking_error(const fitting::TrackSet& tracks, const MovingSurfac
       continue;
     }
     ++out.tracks;
+    std::vector<Eigen::Matrix2d> covariances;
+    std::vector<double> errors;
     for (auto o = first + 1; o != track.observations.end(); ++o) {
       if (!is_ok(*o)) continue;
       const Vec2 error = o->pixel - camera.project(truth.position(*point, o->frame));
       if (!error.allFinite()) continue;
       distances.push_back(error.norm());
-      chi += error.dot(o->covariance.inverse() * error) / 2;
+      chi += error.dot((first->covariance + o->covariance).inverse() * error) / 2;
+      covariances.push_back(fitting::with_floor(o->covariance, noise.min_sigma / std::sqrt(2.)));
+      errors.insert(errors.end(), {error.x(), error.y()});
       auto& [sum, count] = by_frame[o->frame];
       sum += error.squaredNorm(), ++count;
     }
+    if (errors.empty()) continue;
+    const fitting::TrackNoise model(fitting::with_floor(first->covariance, noise.min_sigma / std::sqrt(2.)),
+                                    covariances, noise.robust_scale);
+    const VectorXd r = Eigen::Map<const VectorXd>(errors.data(), static_cast<Eigen::Index>(errors.size()));
+    whitened += model.weighted_residual(r, model.evaluate(r)).squaredNorm();
   }
   if (distances.empty()) return out;
   std::sort(distances.begin(), distances.end());
@@ -63,6 +73,7 @@ TrackingError tracking_error(const fitting::TrackSet& tracks, const MovingSurfac
   out.rms_px = std::sqrt(squares / static_cast<double>(n));
   out.median_px = distances[n / 2], out.p95_px = distances[n * 95 / 100], out.largest_px = distances.back();
   out.normalised = std::sqrt(chi / static_cast<double>(n));
+  out.reduced_chi_square = whitened / (2 * static_cast<double>(n));
   const auto& [sum, count] = by_frame.rbegin()->second;
   out.last_frame_rms_px = std::sqrt(sum / count);
   return out;

@@ -133,9 +133,10 @@ Accuracy challenge_accuracy(const std::string& folder, int level, double max_x, 
     const Vec2 error = o.pixel - seed - Vec2(exact, 0);
     a.rms_x += error.x() * error.x();
     a.rms_y += error.y() * error.y();
-    a.normalised_x += error.x() * error.x() / o.covariance(0, 0);
-    a.normalised_y += error.y() * error.y() / o.covariance(1, 1);
-    a.sigma += o.covariance(0, 0);
+    const Eigen::Matrix2d covariance = t.observations[0].covariance + o.covariance;
+    a.normalised_x += error.x() * error.x() / covariance(0, 0);
+    a.normalised_y += error.y() * error.y() / covariance(1, 1);
+    a.sigma += covariance(0, 0);
     ++a.points;
   }
   for (double* v : {&a.rms_x, &a.rms_y, &a.normalised_x, &a.normalised_y, &a.sigma})

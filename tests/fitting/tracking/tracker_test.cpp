@@ -8,6 +8,8 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
+#include "fitting/identifiability.h"
+#include "fitting/track_noise.h"
 #include "fitting/tracking/noise_floor.h"
 #include "footage_folder.h"
 #include "sim/core/error.h"
@@ -62,7 +64,7 @@ Errors errors_of(const TrackSet& set, Truth truth) {
       if (o.status != TrackStatus::ok) continue;
       const Vec2 d = o.pixel - truth(o.frame, t.observations[0].pixel);
       e.rms += d.squaredNorm();
-      e.normalised += d.dot(o.covariance.ldlt().solve(d));
+      e.normalised += d.dot((t.observations[0].covariance + o.covariance).ldlt().solve(d));
       e.worst = std::max(e.worst, d.norm());
       ++e.count;
     }
@@ -94,6 +96,92 @@ TEST(Tracker, FollowsAnAffineMotionAndKnowsItsErrors) {
   EXPECT_LT(e.rms, 0.02);
   EXPECT_GT(e.normalised, 0.8);
   EXPECT_LT(e.normalised, 1.4);
+}
+
+// What the tracker says and how the fit reads it belong together: errors against the exact motion, whitened
+// by the fit's noise model, have unit variance, and so have innovations, which do not remember the last
+// frame.
+TEST(Tracker, ErrorsAreWhiteUnderTheNoiseModelOfTheFit) {
+  for (const double noise : {1.5, 4.0}) {
+    const Speckle skin(kWidth, kHeight, 31);
+    FootageFolder folder;
+    for (int f = 0; f < 10; ++f) folder.add(picture(skin, motion(f), noise, 600 + f));
+    FrameSource source = folder.source();
+    const TrackerResult r = track(source, small_grid());
+    double squares = 0, own = 0;
+    int numbers = 0;
+    std::vector<MatrixXd> innovations;
+    std::vector<std::vector<int>> frames;
+    for (const Track& t : r.tracks.tracks) {
+      std::vector<Eigen::Matrix2d> covariances;
+      std::vector<int> seen;
+      VectorXd errors(2 * (t.observations.size() - 1));
+      for (std::size_t i = 1; i < t.observations.size(); ++i) {
+        const Observation& o = t.observations[i];
+        ASSERT_EQ(o.status, TrackStatus::ok);
+        errors.segment<2>(2 * (i - 1)) = o.pixel - truth(o.frame, t.observations[0].pixel);
+        covariances.push_back(o.covariance);
+        seen.push_back(o.frame);
+      }
+      const TrackNoise model(t.observations[0].covariance, covariances, 0);
+      const auto at = model.evaluate(errors);
+      squares += 2 * at.cost;
+      numbers += static_cast<int>(errors.size());
+      innovations.push_back(model.innovations(errors, at));
+      frames.push_back(seen);
+      // The frames' own share alone: scatter about the track's mean, which the common share does not enter.
+      const auto n = static_cast<double>(covariances.size());
+      for (int axis = 0; axis < 2; ++axis) {
+        double mean = 0, variance = 0;
+        for (Eigen::Index i = axis; i < errors.size(); i += 2) mean += errors[i] / n;
+        for (Eigen::Index i = axis; i < errors.size(); i += 2)
+          variance += std::pow(errors[i] - mean, 2) / (n - 1);
+        own += variance / covariances[0](axis, axis) / (2 * static_cast<double>(r.tracks.tracks.size()));
+      }
+    }
+    const double chi = squares / numbers, rho = lag_one_autocorrelation(innovations, frames);
+    std::printf("noise %.1f: reduced chi-square %.3f, own variance ratio %.3f, lag-1 %.3f\n", noise, chi, own,
+                rho);
+    EXPECT_GT(chi, 0.75);
+    EXPECT_LT(chi, 1.7);
+    EXPECT_GT(own, 0.75);
+    EXPECT_LT(own, 1.7);
+    EXPECT_LT(std::fabs(rho), 0.25);
+  }
+}
+
+// Points that were covered right after the first frame know their first error as well as the others.
+TEST(Tracker, FirstCovarianceOfLateTracksIsThatOfTheirNeighbours) {
+  const Speckle skin(kWidth, kHeight, 32);
+  FootageFolder folder;
+  for (int f = 0; f < 4; ++f) folder.add(picture(skin, {}, 2.5, 700 + f));
+  TrackerOptions o = small_grid();
+  o.redetect = true;
+  o.mask = [](const Frame& frame) {  // the left half in frame 1, the upper right corner from then on
+    cv::Mat mask(kHeight, kWidth, CV_8U, cv::Scalar(0));
+    if (frame.index == 1) mask(cv::Rect(0, 0, 90, kHeight)) = 255;
+    if (frame.index >= 1) mask(cv::Rect(140, 0, 60, 50)) = 255;
+    return mask;
+  };
+  FrameSource source = folder.source();
+  const TrackerResult r = track(source, o);
+  std::map<int, std::vector<double>> deviations;  // by the first frame in which they were seen again
+  for (const Track& t : r.tracks.tracks) {
+    int first = 0;
+    for (const Observation& ob : t.observations)
+      if (first == 0 && ob.frame > 0 && ob.status == TrackStatus::ok) first = ob.frame;
+    deviations[first].push_back(std::sqrt(t.observations[0].covariance.trace() / 2));
+  }
+  for (const int first : {0, 1, 2}) {
+    ASSERT_GT(deviations[first].size(), 3u) << first;
+    std::nth_element(deviations[first].begin(), deviations[first].begin() + deviations[first].size() / 2,
+                     deviations[first].end());
+  }
+  const auto median = [&](int first) { return deviations[first][deviations[first].size() / 2]; };
+  std::printf("first deviation: seen at once %.4f, later %.4f, never %.4f px\n", median(1), median(2),
+              median(0));
+  EXPECT_NEAR(median(2) / median(1), 1, 0.3);
+  EXPECT_NEAR(median(0) / median(1), 1, 0.4);
 }
 
 TEST(Tracker, WithoutNoiseOnlyRoundingIsLeft) {
