@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 #include "sim/core/error.h"
@@ -14,14 +15,34 @@ namespace {
 
 /// Singular values below this part of the largest are zero within the accuracy of the tangent sweep.
 constexpr double kNullTolerance = 1e-8;
-/// Components of a unit direction below this are left out of sentences.
-constexpr double kMentioned = 0.25;
+/// Components of a direction below this part of its largest one are left out of sentences.
+constexpr double kMentioned = 0.3;
+/// And so are all beyond this many; the sentence then says how many they are.
+constexpr int kMentionedAtMost = 8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::string format(const char* pattern, double x) {
   char text[64];
   std::snprintf(text, sizeof(text), pattern, x);
   return text;
+}
+
+/// Up to here the finite sum for whole degrees of freedom is used; beyond, an expansion errs by less than
+/// 1e-7.
+constexpr int kExactStudent = 100;
+
+/// P(|T| <= t) of Student's t with v degrees of freedom (Abramowitz and Stegun 26.7.3, 26.7.4).
+double student_within(double t, int v) {
+  const double theta = std::atan(t / std::sqrt(v)), c = std::cos(theta), s = std::sin(theta);
+  const bool is_odd = v % 2 == 1;
+  // Odd: cos + 2/3 cos³ + 2·4/(3·5) cos⁵ ... to cos^(v−2); even: 1 + 1/2 cos² + 1·3/(2·4) cos⁴ ... to the
+  // same.
+  double term = is_odd ? c : 1, sum = 0;
+  for (int power = is_odd ? 1 : 0; power <= v - 2; power += 2) {
+    sum += term;
+    term *= c * c * (power + 1) / (power + 2);
+  }
+  return is_odd ? 2 / std::numbers::pi * (theta + s * sum) : s * sum;
 }
 
 }  // namespace
@@ -92,13 +113,18 @@ std::string Identifiability::direction_in_words(int i) const {
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return std::fabs(v[a]) > std::fabs(v[b]); });
   std::string up, down;
-  int mentioned = 0;
+  int mentioned = 0, more = 0;
   for (const int k : order) {
-    if (std::fabs(v[k]) < kMentioned) continue;
+    if (std::fabs(v[k]) < kMentioned * std::fabs(v[order.front()])) break;
+    if (mentioned == kMentionedAtMost) {
+      ++more;
+      continue;
+    }
     std::string& list = v[k] > 0 ? up : down;
     list += (list.empty() ? "" : ", ") + variables_[k].name;
     ++mentioned;
   }
+  if (more > 0) (down.empty() ? up : down) += " and " + std::to_string(more) + " more";
   const std::string effect = i >= rank_ ? " changes no tracked feature."
                                         : " by 10 % changes all tracked features together by only " +
                                               format("%.2g", 0.1 * singular_values_[i] / widening_) +
@@ -127,10 +153,24 @@ std::vector<std::string> Identifiability::cannot_tell() const {
 }
 
 double student_quantile_975(int degrees_of_freedom) {
-  const double z = 1.959963984540054, v = std::max(1, degrees_of_freedom);
-  const double z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-  return z + (z3 + z) / (4 * v) + (5 * z5 + 16 * z3 + 3 * z) / (96 * v * v) +
-         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * v * v * v);
+  const int v = std::max(1, degrees_of_freedom);
+  if (v > kExactStudent) {
+    const double z = 1.959963984540054, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
+    const double d = v;
+    return z + (z3 + z) / (4 * d) + (5 * z5 + 16 * z3 + 3 * z) / (96 * d * d) +
+           (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * d * d * d);
+  }
+  double low = 1.9, high = 12.8;  // the quantiles of infinity and of one degree of freedom lie inside
+  for (int round = 0; round < 60; ++round) {
+    const double middle = 0.5 * (low + high);
+    (student_within(middle, v) < 0.95 ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+double interval_widening(double reduced_chi_square, double autocorrelation) {
+  const double rho = std::clamp(autocorrelation, 0.0, 0.95);
+  return std::sqrt(std::max(1.0, reduced_chi_square) * (1 + rho) / (1 - rho));
 }
 
 double lag_one_autocorrelation(const std::vector<MatrixXd>& series,

@@ -45,8 +45,13 @@ class Identifiability {
   int rank_ = 0;
 };
 
-/// 97.5 % quantile of Student's t (Cornish-Fisher expansion; error below 0.01 from 4 degrees of freedom on).
+/// 97.5 % quantile of Student's t, to 1e-7; fewer than one degree of freedom counts as one.
 double student_quantile_975(int degrees_of_freedom);
+
+/// Factor on all standard deviations for what the noise model missed: √max(1, χ²) for its size, and
+/// √((1 + ρ)/(1 − ρ)) for its memory, since an AR(1) process of n values carries the information of
+/// n (1 − ρ)/(1 + ρ) independent ones; ρ is cut to [0, 0.95].
+double interval_widening(double reduced_chi_square, double autocorrelation);
 
 /// Pooled lag-1 autocorrelation of series [n][2] with neighbours `frames` one apart; 0 when there are none.
 double lag_one_autocorrelation(const std::vector<MatrixXd>& series,

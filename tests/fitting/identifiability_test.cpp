@@ -5,8 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <cmath>
+#include <numeric>
 #include <random>
+
+#include "fitting/track_noise.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -72,10 +76,89 @@ TEST(Identifiability, WeakDirectionIsAStatementNotAnError) {
   EXPECT_THAT(found.cannot_tell().at(0), HasSubstr("trade off against"));
 }
 
+TEST(Identifiability, DirectionsOfManyParametersHaveNames) {
+  constexpr int n = 25;  // a common scale of all of them: every component is 0.2
+  const MatrixXd any = random_matrix(60, n, 12);
+  const VectorXd common = VectorXd::Constant(n, 1 / std::sqrt(double(n)));
+  const MatrixXd j = any - (any * common) * common.transpose();
+  std::vector<std::string> names;
+  for (int k = 0; k < n; ++k) names.push_back("p" + std::to_string(k));
+  const Identifiability found(j, variables(names), 1);
+  EXPECT_EQ(found.rank(), n - 1);
+  EXPECT_THAT(found.cannot_tell().at(0),
+              testing::AllOf(HasSubstr("p"), HasSubstr(" and 17 more go together")));
+}
+
+// Intervals as a fit makes them, over repeated noise of exactly the stated kind, in a problem that is linear:
+// tracks with a common first error and their own ones, whitened by TrackNoise, widened as a fit does.
+TEST(Identifiability, IntervalsHoldTheTruthAsOftenAsTheySay) {
+  constexpr int kTracks = 12, kFrames = 8, kParameters = 3, kRepeats = 1500;
+  constexpr double kFirst = 0.03, kOwn = 0.05;  // px
+  const Eigen::Matrix2d first = kFirst * kFirst * Eigen::Matrix2d::Identity();
+  const std::vector<Eigen::Matrix2d> later(kFrames, kOwn * kOwn * Eigen::Matrix2d::Identity());
+  std::vector<MatrixXd> jacobians;
+  const MatrixXd all = random_matrix(2 * kFrames * kTracks, kParameters, 1);
+  for (int i = 0; i < kTracks; ++i) jacobians.push_back(all.middleRows(2 * kFrames * i, 2 * kFrames));
+  for (const double huber : {0.0, 3.0}) {
+    const TrackNoise noise(first, later, huber);
+    std::mt19937 rng(5);
+    std::normal_distribution<double> normal;
+    int inside = 0;
+    double chi = 0, width = 0;
+    for (int repeat = 0; repeat < kRepeats; ++repeat) {
+      std::vector<VectorXd> errors;
+      for (int i = 0; i < kTracks; ++i) {
+        const Vec2 common(kFirst * normal(rng), kFirst * normal(rng));
+        VectorXd r(2 * kFrames);
+        for (int f = 0; f < kFrames; ++f)
+          r.segment<2>(2 * f) = common + kOwn * Vec2(normal(rng), normal(rng));
+        errors.push_back(r);
+      }
+      VectorXd t = VectorXd::Zero(kParameters), z(kTracks * noise.num_rows());
+      MatrixXd j(kTracks * noise.num_rows(), kParameters);
+      std::vector<MatrixXd> innovations;
+      for (int round = 0; round < 4; ++round) {  // robust weights settle
+        innovations.clear();
+        for (int i = 0; i < kTracks; ++i) {
+          const VectorXd r = errors[i] - jacobians[i] * t;
+          const auto at = noise.evaluate(r);
+          z.segment(i * noise.num_rows(), noise.num_rows()) = noise.weighted_residual(r, at);
+          j.middleRows(i * noise.num_rows(), noise.num_rows()) = noise.weighted_jacobian(at, jacobians[i]);
+          innovations.push_back(noise.innovations(r, at));
+        }
+        t += j.householderQr().solve(z);
+      }
+      const int dof = 2 * kTracks * kFrames - kParameters;
+      std::vector<int> frames(kFrames);
+      std::iota(frames.begin(), frames.end(), 1);
+      const double squares = z.squaredNorm() / dof;
+      const double rho = lag_one_autocorrelation(innovations, std::vector<std::vector<int>>(kTracks, frames));
+      const Identifiability found(j, variables({"a", "b", "c"}), interval_widening(squares, rho));
+      const double quantile = student_quantile_975(dof);
+      for (int k = 0; k < kParameters; ++k) inside += std::fabs(t[k]) <= quantile * found.sigma(k);
+      chi += squares / kRepeats;
+      width += interval_widening(squares, rho) / kRepeats;
+    }
+    const double coverage = double(inside) / (kRepeats * kParameters);
+    std::printf(
+        "Huber %.0f: %.1f %% of intervals hold the truth, mean reduced chi-square %.3f, widening %.3f\n",
+        huber, 100 * coverage, chi, width);
+    EXPECT_GT(coverage, 0.94);
+    EXPECT_LT(coverage, 0.985);
+    EXPECT_NEAR(chi, 1, 0.04);
+  }
+}
+
 TEST(Identifiability, StudentQuantiles) {
-  EXPECT_NEAR(student_quantile_975(4), 2.7764, 0.01);  // tables
-  EXPECT_NEAR(student_quantile_975(10), 2.2281, 2e-4);
-  EXPECT_NEAR(student_quantile_975(30), 2.0423, 1e-4);
+  EXPECT_NEAR(student_quantile_975(0), 12.706204736, 1e-8);  // tables; no freedom left counts as one
+  EXPECT_NEAR(student_quantile_975(1), 12.706204736, 1e-8);
+  EXPECT_NEAR(student_quantile_975(2), 4.302652730, 1e-8);
+  EXPECT_NEAR(student_quantile_975(3), 3.182446305, 1e-8);
+  EXPECT_NEAR(student_quantile_975(4), 2.776445105, 1e-8);
+  EXPECT_NEAR(student_quantile_975(10), 2.228138852, 1e-8);
+  EXPECT_NEAR(student_quantile_975(30), 2.042272456, 1e-8);
+  EXPECT_NEAR(student_quantile_975(100), 1.983971519, 1e-8);
+  EXPECT_NEAR(student_quantile_975(120), 1.979930405, 1e-7);
   EXPECT_NEAR(student_quantile_975(100000), 1.95998, 1e-4);
 }
 
