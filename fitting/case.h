@@ -51,10 +51,10 @@ struct TrackCase {
 
 struct FitCase {
   std::vector<FitParameter> parameters;
-  std::string optimiser = "ceres";      ///< ceres | nlopt
-  int max_evaluations = 30;             ///< forward runs
-  double robust_scale = 3;              ///< Huber threshold in standard deviations; 0 = plain least squares
-  double min_sigma = 0.05;              ///< px, floor of a track's standard deviation
+  std::string optimiser = "ceres";  ///< ceres | nlopt
+  int max_evaluations = 30;         ///< forward runs
+  double robust_scale = 3;          ///< Huber threshold in standard deviations; 0 = plain least squares
+  double min_sigma = 0.05;  ///< px, floor of the standard deviation of a displacement since frame 0, per axis
   int first_frame = 1, last_frame = 0;  ///< frames used, 0 = all
   double rim_margin = 1;                ///< mm: tracks closer to the rim of the patch are left out
   /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden

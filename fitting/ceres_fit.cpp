@@ -2,6 +2,7 @@
 #include <glog/logging.h>
 
 #include <cmath>
+#include <limits>
 
 #include "fitting/optimise.h"
 
@@ -27,9 +28,13 @@ class ExperimentCost final : public ceres::CostFunction {
     last_ = t;
     if (evaluation.failed) return false;
     Eigen::Map<VectorXd>(residuals, problem_.num_residuals()) = evaluation.residuals;
-    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    const bool is_accepted = jacobians != nullptr && jacobians[0] != nullptr;
+    // A better point is about to be accepted, and Ceres gives up when its Jacobian then cannot be had. So it
+    // is formed here already (it is kept), where a failure only refuses the step.
+    if (!is_accepted) return evaluation.cost >= accepted_cost_ || problem_.jacobian(t).has_value();
     const std::optional<MatrixXd> jacobian = problem_.jacobian(t);
     if (!jacobian) return false;
+    accepted_cost_ = evaluation.cost;
     Eigen::Map<RowMajor>(jacobians[0], problem_.num_residuals(), problem_.num_parameters()) = *jacobian;
     gradient_norm_ = (jacobian->transpose() * evaluation.residuals).norm();
     return true;
@@ -43,7 +48,7 @@ class ExperimentCost final : public ceres::CostFunction {
   FitProblem& problem_;
   int max_evaluations_;
   mutable VectorXd last_;
-  mutable double gradient_norm_ = 0;
+  mutable double gradient_norm_ = 0, accepted_cost_ = std::numeric_limits<double>::infinity();
 };
 
 /// Ceres logs a failed evaluation to stderr by itself; here it is a status.
@@ -136,9 +141,10 @@ OptimiserOutcome fit_with_ceres(FitProblem& problem, const OptimiserOptions& opt
   using Status = OptimiserOutcome::Status;
   if (problem.was_stopped())
     outcome.status = Status::stopped;
-  else if (problem.best().size() == 0)
+  else if (problem.best().size() == 0) {
     outcome.status = Status::failed;
-  else if (summary.termination_type == ceres::CONVERGENCE)
+    outcome.detail = "no run could be used: " + problem.last_failure();
+  } else if (summary.termination_type == ceres::CONVERGENCE)
     outcome.status = Status::converged;
   else if (problem.counters().forward_runs >= last_run || summary.termination_type == ceres::NO_CONVERGENCE)
     outcome.status = Status::max_evaluations;

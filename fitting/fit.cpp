@@ -62,9 +62,7 @@ NoiseCheck check_noise(FitProblem& problem, const FitEvaluation& at, const Vecto
     frames.push_back(problem.compared()[i].frames);
   }
   check.autocorrelation = lag_one_autocorrelation(innovations, frames);
-  // An AR(1) process of n values carries the information of n (1 − ρ)/(1 + ρ) independent ones.
-  const double rho = std::clamp(check.autocorrelation, 0.0, 0.95);
-  check.widening = std::sqrt(std::max(1.0, check.reduced_chi_square)) * std::sqrt((1 + rho) / (1 - rho));
+  check.widening = interval_widening(check.reduced_chi_square, check.autocorrelation);
   return check;
 }
 
@@ -178,10 +176,10 @@ void add_notes(const FitProblem& problem, const FitInput& input, const FitEvalua
                            " nearer than " + number("%.3g", input.options.rim_margin) + " mm to the rim, " +
                            std::to_string(r.not_refined) + " on a silhouette.");
   result.notes.push_back(
-      "Each track is weighted by its own covariance in every frame (at least " +
-      number("%.3g", input.options.min_sigma) +
-      " px per axis); the error of its first pixel, which places its material point, is carried into all its "
-      "frames.");
+      "Each track is weighted by its own covariance in every frame; the error of its first pixel, which "
+      "places "
+      "its material point, is carried into all its frames. Together they count as at least " +
+      number("%.3g", input.options.min_sigma) + " px per axis.");
   if (input.options.robust_scale > 0 && at != nullptr) {
     int discounted = 0;
     for (const TrackNoise::Evaluation& track : at->tracks)
@@ -207,6 +205,19 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
   problem.on_run = observer.run;
   problem.should_stop = observer.should_stop;
   if (observer.registered) observer.registered(problem);
+  std::optional<EvaluationLog> log;
+  if (!input.evaluations.empty()) {
+    const auto note = [&observer](const std::string& text) {
+      if (observer.note && !text.empty()) observer.note(text);
+    };
+    log.emplace(input.evaluations, fit_identity(input, problem), input.anew);
+    log->warn = note;
+    problem.log = &*log;
+    note(log->set_aside());
+    if (log->num_runs() > 0)
+      note("resumed: " + std::to_string(log->num_runs()) + " runs of an earlier start are in " +
+           input.evaluations);
+  }
   if (input.options.optimiser != "ceres" && input.options.optimiser != "nlopt")
     throw InputError("fit: optimiser", "'" + input.options.optimiser + "'", "ceres or nlopt");
   const OptimiserOptions options{.max_evaluations = input.options.max_evaluations};
@@ -240,6 +251,10 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
     add_residuals(problem, input.tracks, *at, result);
   } else {
     result.final_cost = problem.best_cost();
+  }
+  if (at != nullptr) {
+    result.fitted_scene = problem.parametrisation().scene(t);
+    result.fitted_scene_file = "fitted_scene.json";
   }
   add_notes(problem, input, at, result);
   const std::map<std::string, double> truth = truth_in_gauge(input, problem.parametrisation(), result);

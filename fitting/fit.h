@@ -21,6 +21,10 @@ struct FitInput {
   /// Address by names → value, internal units; empty for real footage. Where the truth's gauge modulus is not
   /// the one held, stiffnesses are compared per unit of it (the footage cannot tell more).
   std::map<std::string, double> truth;
+  /// Folder of the log of evaluations (evaluation_log.h) that lets an interrupted fit be resumed; empty:
+  /// none.
+  std::string evaluations = {};
+  bool anew = false;  ///< do not use what the log already holds
 };
 
 struct FitObserver {
@@ -28,6 +32,7 @@ struct FitObserver {
   std::function<void(const FitIteration&)> iteration;  ///< after every iteration of the optimiser
   std::function<void(const FitProblem&)> registered;   ///< once, before the first run
   std::function<bool()> should_stop;                   ///< polled inside runs
+  std::function<void(const std::string&)> note;        ///< what became of the log of evaluations, one line
 };
 
 /// Fits. Fields of the result about files and the case are left to the caller. Throws InputError for a case

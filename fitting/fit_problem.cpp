@@ -46,6 +46,10 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& cam
     }
   for (const RegisteredTrack& r : registration_.tracks) points.push_back(r.point);
   prediction_.emplace(model_.model().mesh, std::move(points), camera, std::move(points_in_frame));
+  for (int f = 0; f <= options_.frames; ++f) {
+    frame_row_.push_back(num_predicted_);
+    num_predicted_ += prediction_->size(f);
+  }
 
   for (const TrackNoise& n : noise_) num_residuals_ += n.num_rows();
   for (const FitVariable& v : parametrisation_.variables()) num_residuals_ += v.prior_sigma ? 1 : 0;
@@ -53,6 +57,8 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& cam
 
 void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit, const std::string& camera) {
   const int first = std::max(1, fit.first_frame);
+  const double floor =
+      fit.min_sigma / std::sqrt(2.);  // of the two parts of a displacement's variance, half each
   std::vector<RegisteredTrack> used;
   for (const RegisteredTrack& r : registration_.tracks) {
     const Track& track = tracks.tracks[r.track];
@@ -63,11 +69,11 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
       if (o.status != TrackStatus::ok || o.frame < first || o.frame > options_.frames) continue;
       compared.frames.push_back(o.frame);
       compared.observed.push_back(o.pixel);
-      covariances.push_back(with_floor(o.covariance, fit.min_sigma));
+      covariances.push_back(with_floor(o.covariance, floor));
     }
     if (compared.frames.empty()) continue;
     num_observations_ += static_cast<int>(compared.frames.size());
-    noise_.emplace_back(with_floor(track.at(0)->covariance, fit.min_sigma), covariances, fit.robust_scale);
+    noise_.emplace_back(with_floor(track.at(0)->covariance, floor), covariances, fit.robust_scale);
     compared_.push_back(std::move(compared));
     used.push_back(r);
   }
@@ -95,31 +101,40 @@ const FitEvaluation& FitProblem::evaluate(const VectorXd& t) {
 }
 
 void FitProblem::run(const VectorXd& t) {
-  const auto start = std::chrono::steady_clock::now();
+  using Kind = EvaluationLog::Kind;
   t_ = t;
+  trajectory_.reset();
   difference_jacobians_.reset();
   evaluation_ = FitEvaluation();
-  trajectory_ = Trajectory();
+  native_ = model_.native(parametrisation_.scene(t));
+  std::optional<EvaluationLog::Record> record = log != nullptr ? log->find(Kind::run, t) : std::nullopt;
+  if (record && record->failure.empty() && record->values.size() != num_predicted_) record.reset();
+  const bool is_replayed = record.has_value();
+  if (!record) {
+    record = simulate_and_project();
+    if (log != nullptr && !was_stopped_) log->add(Kind::run, t, *record);
+  }
+  const Bits bits(t.begin(), t.end());
+  const bool is_known = without_derivative_.contains(bits);
+  if (!record->failure.empty())
+    fail(record->failure);
+  else if (is_known)
+    fail("the run at these values cannot be differentiated");
+  else
+    compare(record->values);
+  // What this fit has asked for before and the log holds costs nothing and is not counted again.
+  if (!counted_.insert({Kind::run, bits}).second && is_replayed) return;
+
   FitProgress progress;
   progress.values = parametrisation_.values(t);
-  native_ = model_.native(parametrisation_.scene(t));
-  RunObserver observer;
-  observer.iteration = [&](int, double, int, double, double) {
-    was_stopped_ = was_stopped_ || (should_stop && should_stop());
-    return !was_stopped_;
-  };
-  trajectory_ = simulate(model_.model(), native_, options_, observer);
-  if (trajectory_.complete)
-    compare();
-  else
-    evaluation_.failure = trajectory_.failure;
   progress.forward_runs = ++counters_.forward_runs;
   if (evaluation_.failed) ++counters_.failed_runs;
-  progress.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  progress.seconds = record->seconds;
+  progress.replayed = is_replayed;
   counters_.forward_seconds.push_back(progress.seconds);
-  if (!evaluation_.failed && (best_.size() == 0 || evaluation_.cost < best_cost_)) {
-    best_ = t;
-    best_cost_ = evaluation_.cost;
+  if (!evaluation_.failed) {
+    good_.emplace_back(evaluation_.cost, t);
+    find_best();
   }
   progress.cost = evaluation_.cost;
   progress.failed = evaluation_.failed;
@@ -127,18 +142,51 @@ void FitProblem::run(const VectorXd& t) {
   if (on_run) on_run(progress);
 }
 
-void FitProblem::compare() {
-  std::vector<VectorXd> predicted(frames() + 1);
-  for (int f = 0; f <= frames(); ++f) predicted[f] = prediction_->values(f, trajectory_.at_frame(f));
+EvaluationLog::Record FitProblem::simulate_and_project() {
+  const auto start = std::chrono::steady_clock::now();
+  RunObserver observer;
+  observer.iteration = [&](int, double, int, double, double) {
+    was_stopped_ = was_stopped_ || (should_stop && should_stop());
+    return !was_stopped_;
+  };
+  trajectory_ = simulate(model_.model(), native_, options_, observer);
+  EvaluationLog::Record record;
+  if (trajectory_->complete) {
+    record.values.resize(num_predicted_, 1);
+    for (int f = 0; f <= frames(); ++f)
+      record.values.col(0).segment(frame_row_[f], prediction_->size(f)) =
+          prediction_->values(f, trajectory_->at_frame(f));
+  } else {
+    record.failure = trajectory_->failure.empty() ? "the run did not complete" : trajectory_->failure;
+  }
+  record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return record;
+}
+
+void FitProblem::fail(const std::string& why) {
+  evaluation_.failed = true;
+  evaluation_.failure = last_failure_ = why;
+}
+
+void FitProblem::find_best() {
+  best_.resize(0);
+  for (const auto& [cost, t] : good_)
+    if (best_.size() == 0 || cost < best_cost_) {
+      best_ = t;
+      best_cost_ = cost;
+    }
+}
+
+void FitProblem::compare(const VectorXd& predicted) {
   evaluation_.residuals.resize(num_residuals_);
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < compared_.size(); ++i) {
     const ComparedTrack& c = compared_[i];
     VectorXd r(2 * c.frames.size());
     for (std::size_t j = 0; j < c.frames.size(); ++j)
-      r.segment<2>(2 * j) = c.observed[j] - predicted[c.frames[j]].segment<2>(output_row_[i][j]);
+      r.segment<2>(2 * j) = c.observed[j] - predicted.segment<2>(frame_row_[c.frames[j]] + output_row_[i][j]);
     if (!r.allFinite()) {
-      evaluation_.failure = "a tracked point left the view of the camera";
+      fail("a tracked point left the view of the camera");
       return;
     }
     evaluation_.tracks.push_back(noise_[i].evaluate(r));
@@ -153,29 +201,63 @@ void FitProblem::compare() {
   evaluation_.failed = false;
 }
 
+std::optional<MatrixXd> FitProblem::derivative(EvaluationLog::Kind kind,
+                                               const std::function<MatrixXd()>& sweep, int& count,
+                                               std::vector<double>& seconds) {
+  const Bits bits(t_.begin(), t_.end());
+  std::optional<EvaluationLog::Record> record = log != nullptr ? log->find(kind, t_) : std::nullopt;
+  if (!record) {
+    if (!trajectory_) simulate_and_project();  // the run came from the log, its states did not
+    if (was_stopped_) {
+      fail("stopped");
+      return std::nullopt;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    record.emplace();
+    try {
+      record->values = sweep();
+    } catch (const adjoint::GradientError& error) {
+      record->failure = error.what();
+    }
+    record->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (log != nullptr) log->add(kind, t_, *record);
+  }
+  if (!record->failure.empty()) {
+    fail(record->failure);
+    without_derivative_.insert(bits);
+    std::erase_if(good_, [this](const auto& point) { return point.second == t_; });
+    find_best();
+    return std::nullopt;
+  }
+  if (counted_.insert({kind, bits}).second) {
+    ++count;
+    seconds.push_back(record->seconds);
+  }
+  return std::move(record->values);
+}
+
 std::optional<std::vector<MatrixXd>> FitProblem::difference_jacobians(const VectorXd& t) {
   if (evaluate(t).failed) return std::nullopt;
   if (difference_jacobians_) return difference_jacobians_;
-  const auto start = std::chrono::steady_clock::now();
-  adjoint::TangentResult tangent;
-  try {
-    tangent = adjoint::tangent_sweep(model_.model(), native_, trajectory_, *prediction_,
-                                     parametrisation_.native_directions(model_, t));
-  } catch (const adjoint::GradientError& error) {
-    evaluation_.failure = error.what();
-    return std::nullopt;
-  }
+  const auto sweep = [&] {
+    const adjoint::TangentResult tangent = adjoint::tangent_sweep(
+        model_.model(), native_, *trajectory_, *prediction_, parametrisation_.native_directions(model_, t));
+    MatrixXd all(num_predicted_, num_parameters());
+    for (int f = 0; f <= frames(); ++f)
+      all.middleRows(frame_row_[f], prediction_->size(f)) = tangent.frames[f];
+    return all;
+  };
+  const auto tangent =
+      derivative(EvaluationLog::Kind::tangent, sweep, counters_.tangent_sweeps, counters_.tangent_seconds);
+  if (!tangent) return std::nullopt;
   std::vector<MatrixXd> result;
   for (std::size_t i = 0; i < compared_.size(); ++i) {
     const ComparedTrack& c = compared_[i];
     MatrixXd dr(2 * c.frames.size(), num_parameters());
     for (std::size_t j = 0; j < c.frames.size(); ++j)
-      dr.middleRows<2>(2 * j) = -tangent.frames[c.frames[j]].middleRows<2>(output_row_[i][j]);
+      dr.middleRows<2>(2 * j) = -tangent->middleRows<2>(frame_row_[c.frames[j]] + output_row_[i][j]);
     result.push_back(std::move(dr));
   }
-  ++counters_.tangent_sweeps;
-  counters_.tangent_seconds.push_back(
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   difference_jacobians_ = std::move(result);
   return difference_jacobians_;
 }
@@ -214,28 +296,24 @@ std::optional<FitProblem::Linearised> FitProblem::linearised(const VectorXd& t) 
 
 std::optional<VectorXd> FitProblem::gradient(const VectorXd& t) {
   if (evaluate(t).failed) return std::nullopt;
-  const auto start = std::chrono::steady_clock::now();
-  std::vector<VectorXd> weights(frames() + 1);
-  for (int f = 0; f <= frames(); ++f) weights[f] = VectorXd::Zero(prediction_->size(f));
-  for (std::size_t i = 0; i < compared_.size(); ++i)
-    for (std::size_t j = 0; j < compared_[i].frames.size(); ++j)
-      weights[compared_[i].frames[j]].segment<2>(output_row_[i][j]) =
-          -evaluation_.tracks[i].gradient.segment<2>(2 * j);
-  VectorXd out;
-  try {
-    const adjoint::AdjointResult sweep =
-        adjoint::adjoint_sweep(model_.model(), native_, trajectory_, *prediction_, weights);
-    out = parametrisation_.native_directions(model_, t).transpose() * sweep.native_bar;
-  } catch (const adjoint::GradientError& error) {
-    evaluation_.failure = error.what();
-    return std::nullopt;
-  }
+  const auto sweep = [&]() -> MatrixXd {
+    std::vector<VectorXd> weights(frames() + 1);
+    for (int f = 0; f <= frames(); ++f) weights[f] = VectorXd::Zero(prediction_->size(f));
+    for (std::size_t i = 0; i < compared_.size(); ++i)
+      for (std::size_t j = 0; j < compared_[i].frames.size(); ++j)
+        weights[compared_[i].frames[j]].segment<2>(output_row_[i][j]) =
+            -evaluation_.tracks[i].gradient.segment<2>(2 * j);
+    const adjoint::AdjointResult result =
+        adjoint::adjoint_sweep(model_.model(), native_, *trajectory_, *prediction_, weights);
+    return parametrisation_.native_directions(model_, t).transpose() * result.native_bar;
+  };
+  const auto of_tracks =
+      derivative(EvaluationLog::Kind::adjoint, sweep, counters_.adjoint_sweeps, counters_.adjoint_seconds);
+  if (!of_tracks) return std::nullopt;
+  VectorXd out = of_tracks->col(0);
   for (int k = 0; k < num_parameters(); ++k)
     if (const auto& prior = parametrisation_.variables()[k].prior_sigma)
       out[k] += (t[k] - parametrisation_.initial()[k]) / (*prior * *prior);
-  ++counters_.adjoint_sweeps;
-  counters_.adjoint_seconds.push_back(
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   return out;
 }
 

@@ -4,15 +4,18 @@
 //   F(t) = Σ_tracks cost(observed − predicted(t)) + ½ Σ ((t_k − t_k,initial) / prior_k)²
 //   residuals z with F = ½|z|²;  rows: tracks one after the other, then priors
 //
-// The last run is kept: value, Jacobian and gradient at the same t share it.
-// Tests: tests/fitting/fit_test.cpp
+// The last run is kept: value, Jacobian and gradient at the same t share it. With a log, what it holds is
+// taken from there instead of being computed, and what is computed is added to it. Tests:
+// tests/fitting/fit_test.cpp
 #pragma once
 
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "fitting/evaluation_log.h"
 #include "fitting/parametrisation.h"
 #include "fitting/projected_points.h"
 #include "fitting/registration.h"
@@ -36,6 +39,7 @@ struct FitProgress {
   int forward_runs = 0;
   double cost = 0, seconds = 0;  ///< of this run
   bool failed = false;
+  bool replayed = false;  ///< from the log; `seconds` are those of then
   std::string failure;
   VectorXd values;  ///< parameters, internal units
 };
@@ -60,7 +64,8 @@ class FitProblem {
   /// Forward run at t, or the kept one when t is the same to the last bit.
   const FitEvaluation& evaluate(const VectorXd& t);
   /// ∂z/∂t [num_residuals][num_parameters]; nothing (and `failure` of the evaluation set) when the run failed
-  /// or cannot be differentiated.
+  /// or cannot be differentiated. A point without derivative counts as failed from then on and is never the
+  /// best.
   std::optional<MatrixXd> jacobian(const VectorXd& t);
   /// ∂F/∂t by the adjoint sweep; nothing as above.
   std::optional<VectorXd> gradient(const VectorXd& t);
@@ -85,6 +90,8 @@ class FitProblem {
     std::vector<double> forward_seconds, tangent_seconds, adjoint_seconds;
   };
   const Counters& counters() const { return counters_; }
+  /// Why the last failed evaluation failed; empty before one did.
+  const std::string& last_failure() const { return last_failure_; }
   /// Lowest cost of all evaluations so far and where; empty vector before the first that did not fail.
   const VectorXd& best() const { return best_; }
   double best_cost() const { return best_cost_; }
@@ -92,11 +99,19 @@ class FitProblem {
   std::function<void(const FitProgress&)> on_run;  ///< after every forward run
   std::function<bool()> should_stop;               ///< polled inside runs; true makes the run fail
   bool was_stopped() const { return was_stopped_; }
+  EvaluationLog* log = nullptr;  ///< may be null; must outlive the last evaluation
 
  private:
   void choose_observations(const TrackSet& tracks, const FitCase& fit, const std::string& camera);
   void run(const VectorXd& t);
-  void compare();
+  /// Simulates at t_ and projects: predicted pixels of all frames below one another, [rows][1].
+  EvaluationLog::Record simulate_and_project();
+  /// A derivative at t_ from the log or from `sweep`; nothing when the run cannot be differentiated.
+  std::optional<MatrixXd> derivative(EvaluationLog::Kind kind, const std::function<MatrixXd()>& sweep,
+                                     int& count, std::vector<double>& seconds);
+  void compare(const VectorXd& predicted);
+  void fail(const std::string& why);
+  void find_best();
   bool is_current(const VectorXd& t) const { return t_.size() == t.size() && t_ == t; }
   /// ∂(observed − predicted)/∂t per track, [2n][parameters].
   std::optional<std::vector<MatrixXd>> difference_jacobians(const VectorXd& t);
@@ -112,12 +127,20 @@ class FitProblem {
   std::vector<std::vector<int>> output_row_;
   int num_residuals_ = 0, num_observations_ = 0;
 
+  std::vector<Eigen::Index> frame_row_;  ///< first row of a frame among the predictions of all
+  Eigen::Index num_predicted_ = 0;
+
   VectorXd t_, native_;
-  Trajectory trajectory_;
+  std::optional<Trajectory> trajectory_;  ///< at t_; not there when the run came from the log
   FitEvaluation evaluation_;
   std::optional<std::vector<MatrixXd>> difference_jacobians_;  ///< at t_
+  using Bits = std::vector<double>;                            ///< of t
+  std::set<std::pair<EvaluationLog::Kind, Bits>> counted_;     ///< evaluations so far
+  std::set<Bits> without_derivative_;
+  std::vector<std::pair<double, VectorXd>> good_;  ///< cost and t
   VectorXd best_;
   double best_cost_ = 0;
+  std::string last_failure_;
   Counters counters_;
   bool was_stopped_ = false;
 };

@@ -12,6 +12,7 @@
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/output/csv.h"
+#include "sim/scene/load.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -92,6 +93,8 @@ void result_fields(Archive& field, Record& r) {
   field("footage_file", r.footage_file);
   field("tracks_file", r.tracks_file);
   field("camera_file", r.camera_file);
+  field("settings", r.settings);
+  field("fitted_scene_file", r.fitted_scene_file);
 }
 
 /// JSON has no NaN and no infinity: null and the words "inf", "-inf" stand for them.
@@ -311,7 +314,9 @@ void write_fit_result(const FitResult& result, const std::string& folder) {
   writer("format", std::string(format_name));
   result_fields(writer, result);
   writer("num_residuals", static_cast<int>(result.residuals.size()));
-  // fit.json comes last: where it is, residuals.csv is complete.
+  // fit.json comes last: where it is, the others are complete.
+  if (result.fitted_scene)
+    write_file(folder + "/" + result.fitted_scene_file, scene_to_json(*result.fitted_scene).dump(1) + "\n");
   write_file(folder + "/residuals.csv", residual_text(result.residuals));
   write_file(folder + "/fit.json", writer.out.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }

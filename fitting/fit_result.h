@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sim/core/types.h"
+#include "sim/scene/scene.h"
 
 namespace rhytid::fitting {
 
@@ -58,12 +59,18 @@ struct FitResult {
   std::vector<std::string> cannot_tell;  ///< sentences: what the footage does not determine
   std::vector<std::string> notes;        ///< schemes, settings, warnings
   std::vector<FitResidual> residuals;
+  /// Files as found from the folder of results, or absolute. scene_file is what the fit began from.
   std::string scene_file, footage_file, tracks_file, camera_file;
+  std::vector<std::string> settings;  ///< changes of the case by --set
+  /// The scene at the fitted values, with everything that settings changed and penalties that follow the
+  /// gauge: a scene file like any other, beside fit.json. Empty when no run succeeded.
+  std::string fitted_scene_file;
+  std::optional<Scene> fitted_scene;  ///< to be written there; not read back
 };
 
-/// fit.json (everything but residuals) and residuals.csv in `folder`; written atomically.
+/// fit.json (everything but the following), residuals.csv and the fitted scene in `folder`; each atomically.
 void write_fit_result(const FitResult& result, const std::string& folder);
-/// Reads both back. Throws InputError.
+/// Reads the first two back. Throws InputError.
 FitResult read_fit_result(const std::string& folder);
 
 }  // namespace rhytid::fitting

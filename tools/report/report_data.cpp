@@ -5,80 +5,33 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
-#include "fitting/parametrisation.h"
 #include "fitting/tracking/frame_source.h"
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
-#include "sim/scene/parameter.h"
 
 namespace rhytid::tools {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The path of an existing file, or nothing.
+/// The path of an existing file, or nothing. Names are relative to the folder of results, or absolute; a
+/// folder that moved takes its files along.
 std::string found_file(const std::string& named, const ReportData& data) {
   if (named.empty()) return {};
   std::error_code ignored;
-  const fs::path path(named);
-  for (const fs::path& candidate :
-       {path, fs::path(data.fit.case_file).parent_path() / path, fs::path(data.folder) / path.filename()}) {
-    if (fs::is_regular_file(candidate, ignored)) return candidate.string();
-  }
+  const fs::path path(named), folder(data.folder);
+  for (const fs::path& candidate : {folder / path, folder / path.filename()})
+    if (fs::is_regular_file(candidate, ignored)) return candidate.lexically_normal().string();
   return {};
-}
-
-Scene scene_of_fit(ReportData& data) {
-  data.scene_file = found_file(data.fit.scene_file, data);
-  if (data.scene_file.empty()) {
-    throw InputError(data.fit.scene_file.empty() ? "the fit names no scene file"
-                                                 : data.fit.scene_file + ": the scene file is not there");
-  }
-  std::vector<std::string> settings;
-  if (data.fit_case) settings = data.fit_case->scene_settings;
-  return load_scene(data.scene_file, settings);
-}
-
-void load_case(ReportData& data) {
-  const std::string file = found_file(data.fit.case_file, data);
-  if (file.empty()) return;
-  try {
-    data.fit_case = fitting::load_case(file);
-  } catch (const InputError& e) {
-    data.left_out.push_back(std::string("The case file was not used: ") + e.what());
-  }
-}
-
-/// The values put in as the fit did: with a case, contact penalties follow the modulus of the gauge layer.
-Scene with_fitted_values(Scene scene, const ReportData& data) {
-  const auto& parameters = data.fit.parameters;
-  if (!data.fit_case || parameters.empty()) {
-    for (const fitting::FittedParameter& p : parameters) set_parameter(scene, p.address, p.value);
-    return scene;
-  }
-  fitting::FitCase fit = data.fit_case->fit;
-  fit.parameters.clear();
-  for (const fitting::FittedParameter& p : parameters) {
-    fitting::FitParameter parameter;
-    parameter.address = p.address;
-    parameter.initial = p.initial, parameter.lower = p.lower, parameter.upper = p.upper;
-    parameter.transform = p.transform == "log"     ? ParameterTransform::log
-                          : p.transform == "logit" ? ParameterTransform::logit
-                                                   : ParameterTransform::none;
-    fit.parameters.push_back(parameter);
-  }
-  const fitting::Parametrisation parametrisation(scene, fit);
-  VectorXd t(parametrisation.size());
-  for (Eigen::Index k = 0; k < t.size(); ++k) {
-    const auto i = static_cast<size_t>(k);
-    t[k] = parametrisation.variables()[i].to_transformed(parameters[i].value);
-  }
-  return parametrisation.scene(t.cwiseMax(parametrisation.lower()).cwiseMin(parametrisation.upper()));
 }
 
 void load_model(ReportData& data) {
   try {
-    data.model = std::make_unique<const SceneModel>(with_fitted_values(scene_of_fit(data), data));
+    if (data.fit.fitted_scene_file.empty()) throw InputError("no run of the fit succeeded");
+    data.scene_file = found_file(data.fit.fitted_scene_file, data);
+    if (data.scene_file.empty())
+      throw InputError(data.fit.fitted_scene_file + ": the scene file is not there");
+    data.model = std::make_unique<const SceneModel>(load_scene(data.scene_file));
   } catch (const InputError& e) {
     data.left_out.push_back(std::string("No picture of the skin: ") + e.what());
   }
@@ -112,7 +65,6 @@ ReportData gather_report_data(const std::string& folder) {
   ReportData data;
   data.folder = folder;
   data.fit = fitting::read_fit_result(folder);
-  load_case(data);
   load_model(data);
   load_camera(data);
   data.footage = found_file(data.fit.footage_file, data);

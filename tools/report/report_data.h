@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "fitting/cameras.h"
-#include "fitting/case.h"
 #include "fitting/fit_result.h"
 #include "sim/output/image.h"
 #include "sim/scene/scene_model.h"
@@ -19,7 +18,6 @@ namespace rhytid::tools {
 struct ReportData {
   std::string folder;
   fitting::FitResult fit;
-  std::optional<fitting::Case> fit_case;    ///< when it can still be read
   std::string scene_file;                   ///< that was read; empty when none could be
   std::unique_ptr<const SceneModel> model;  ///< of the scene at the fitted values, or null
   std::optional<fitting::Camera> camera;
@@ -31,8 +29,8 @@ struct ReportData {
 };
 
 /// Reads fit.json and residuals.csv of `folder` (throws InputError without them) and what they name. Files
-/// are looked for as written, then beside the case file, then in `folder`. The scene is that of
-/// the fit, with the settings of the case, at the fitted values.
+/// are looked for as written (relative to `folder`), then by their name in `folder`. The scene is that which
+/// was fitted, settings included, at the fitted values.
 ReportData gather_report_data(const std::string& folder);
 
 /// A frame of the footage, BGR; nothing when the footage cannot be read that far.

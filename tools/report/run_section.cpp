@@ -59,8 +59,6 @@ Facts count_facts(const ReportData& data) {
       {"Observations", std::to_string(fit.num_observations) + " of " + counted(fit.num_tracks, "track") +
                            " over " + counted(fit.frames, "frame")},
       {"Tracks left out", std::to_string(fit.tracks_left_out)}};
-  if (data.fit_case)
-    facts.emplace_back("Seed of rendered footage", std::to_string(data.fit_case->render.seed));
   return facts;
 }
 
@@ -80,7 +78,7 @@ Facts file_facts(const ReportData& data) {
   };
   add("Case", data.fit.case_file);
   add("Scene of the fit", data.fit.scene_file);
-  if (data.scene_file != data.fit.scene_file) add("Scene in the pictures", data.scene_file);
+  add("Scene at the fitted values", data.scene_file);
   add("Footage", data.fit.footage_file);
   add("Tracks", data.fit.tracks_file);
   add("Camera", data.fit.camera_file);
@@ -114,10 +112,12 @@ void add_run_facts(HtmlPage& page, const ReportData& data) {
     std::string addresses;
     for (const auto& p : data.fit.parameters) addresses += (addresses.empty() ? "" : ",") + p.address;
     if (!addresses.empty()) commands += " --parameters " + shell_word(addresses);
+    for (const std::string& setting : data.fit.settings) commands += " --set " + shell_word(setting);
     commands += "\n";
   }
   page.code(commands + "rhytid report " + shell_word(data.folder));
-  if (!commands.empty()) page.note("Settings given to that run by --set or --max-evaluations come on top.");
+  if (!commands.empty())
+    page.note("Evaluations that are still in the folder are not computed again (--anew computes all).");
   if (!data.left_out.empty()) {
     page.heading("Left out of this report");
     page.list(data.left_out);

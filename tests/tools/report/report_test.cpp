@@ -95,7 +95,8 @@ TEST(Report, IsTheSameTwice) {
 TEST(Report, MissingFilesAreNamedNotFatal) {
   const std::string folder = folder_for("missing");
   test::write_synthetic_fit(folder, 1);
-  for (const char* name : {"scene.json", "camera.yaml", "footage.avi"}) fs::remove(fs::path(folder) / name);
+  for (const char* name : {"fitted_scene.json", "camera.yaml", "footage.avi"})
+    fs::remove(fs::path(folder) / name);
   const ReportOutcome outcome = report(folder, true);
   EXPECT_EQ(outcome.left_out.size(), 3u);
   const std::string html = read_file(outcome.path);
@@ -134,6 +135,22 @@ TEST(Report, AnOpenParameterClaimsNothing) {
                         "The truth is 3 1/mm."));
   EXPECT_THAT(html, HasSubstr("b has no finite deviation anywhere"));
   EXPECT_THAT(html, AllOf(Not(HasSubstr("e304")), Not(HasSubstr("1e30"))));
+}
+
+TEST(Report, ShowsTheSceneThatWasFitted) {
+  const std::string folder = folder_for("fitted_scene");
+  fitting::FitResult fit = test::write_synthetic_fit(folder, 1);
+  set_parameter(*fit.fitted_scene, "/skin/layers/soft/poissons_ratio", 0.31);  // as --set would have
+  fit.settings = {"/settings/0=/skin/layers/soft/poissons_ratio=0.31"};
+  fit.case_file = "/cases/case.json";
+  fitting::write_fit_result(fit, folder);
+  write_file(folder + "/scene.json", "{}");  // what the fit began from plays no part
+  const ReportData data = gather_report_data(folder);
+  ASSERT_TRUE(data.model);
+  EXPECT_EQ(get_parameter(data.model->scene(), "/skin/layers/soft/poissons_ratio"), 0.31);
+  EXPECT_EQ(get_parameter(data.model->scene(), "/skin/layers/film/youngs_modulus"), 1.013);
+  EXPECT_THAT(read_file(report(folder, false).path),
+              HasSubstr("--set /settings/0=/skin/layers/soft/poissons_ratio=0.31"));
 }
 
 TEST(Report, FindsFilesAfterTheFolderMoved) {

@@ -14,6 +14,7 @@
 #include "sim/output/camera.h"
 #include "sim/output/surface_tessellation.h"
 #include "sim/scene/load.h"
+#include "sim/scene/parameter.h"
 #include "sim/scene/scene_model.h"
 #include "sim/time/simulate.h"
 #include "tests/support/small_scenes.h"
@@ -81,6 +82,9 @@ inline fitting::FitResult write_synthetic_fit(const std::string& folder, int fra
   fit.forward_runs = 11, fit.jacobian_runs = 9, fit.seconds = 83, fit.forward_seconds = 4.2;
   fit.frames = frames, fit.reduced_chi_square = 1.21;
 
+  fit.fitted_scene = load_scene(fit.scene_file);
+  fit.fitted_scene_file = "fitted_scene.json";
+  for (const auto& p : fit.parameters) set_parameter(*fit.fitted_scene, p.address, p.value);
   const SceneModel model(load_scene(fit.scene_file));
   const SkinMesh& mesh = model.model().mesh;
   const PinholeCamera view = look_at({1, -16, 26}, {1, 0, 1}, Vec3::UnitY(), 320, 240, 34);

@@ -1,0 +1,126 @@
+// The digests by which a log of evaluations knows its own fit.
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+
+#include "fitting/evaluation_log.h"
+#include "fitting/fit.h"
+#include "sim/core/build_info.h"
+#include "sim/scene/load.h"
+#include "sim/solve/blas_info.h"
+#include "sim/terms/kernel_table.h"
+
+namespace rhytid::fitting {
+namespace {
+
+/// FNV-1a with 64 bits: tells versions of the same thing apart, no defence against forgery.
+class Digest {
+ public:
+  void bytes(const void* data, std::size_t size) {
+    const auto* byte = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < size; ++i) state_ = (state_ ^ byte[i]) * 0x100000001b3ull;
+  }
+  void text(const std::string& s) {
+    number(static_cast<double>(s.size()));
+    bytes(s.data(), s.size());
+  }
+  void number(double x) { bytes(&x, sizeof(x)); }
+  template <class Matrix>
+  void matrix(const Matrix& m) {
+    number(static_cast<double>(m.rows()));
+    for (Eigen::Index i = 0; i < m.rows(); ++i)
+      for (Eigen::Index j = 0; j < m.cols(); ++j) number(m(i, j));
+  }
+  std::string hex() const {
+    char out[24];
+    std::snprintf(out, sizeof(out), "%016llx", static_cast<unsigned long long>(state_));
+    return out;
+  }
+
+ private:
+  std::uint64_t state_ = 0xcbf29ce484222325ull;
+};
+
+std::string program_digest() {
+  Digest d;
+  const BuildInfo build = build_info();
+  const BlasInfo blas = blas_info();
+  for (const std::string& s : {build.version, build.build_type, build.compiler, build.sanitizers,
+                               blas.shared_object, blas.config, std::string(skin_kernel_isa())})
+    d.text(s);
+  // A version says too little while the program is being changed.
+  std::error_code error;
+  const std::filesystem::path self("/proc/self/exe");
+  const auto size = std::filesystem::file_size(self, error);
+  if (!error) d.number(static_cast<double>(size));
+  const auto time = std::filesystem::last_write_time(self, error);
+  if (!error) d.number(static_cast<double>(time.time_since_epoch().count()));
+  return d.hex();
+}
+
+std::string scene_digest(const Scene& scene, const FitProblem& problem) {
+  nlohmann::json json = scene_to_json(scene);
+  for (const char* key : {"name", "description", "output"}) json.erase(key);
+  Digest d;
+  d.text(json.dump());
+  // The surface may come from a file, which can change under the same name.
+  const SkinMesh& mesh = problem.scene_model().model().mesh;
+  d.matrix(mesh.rest);
+  for (const int column : mesh.face_columns) d.number(column);
+  return d.hex();
+}
+
+std::string camera_digest(const Camera& camera) {
+  Digest d;
+  d.text(camera.name);
+  d.number(camera.width);
+  d.number(camera.height);
+  d.matrix(camera.intrinsics);
+  for (const double x : camera.distortion) d.number(x);
+  d.matrix(camera.rotation);
+  d.matrix(camera.translation);
+  return d.hex();
+}
+
+std::string tracks_digest(const TrackSet& tracks) {
+  Digest d;
+  for (const Track& track : tracks.tracks) {
+    d.number(track.id);
+    d.text(track.camera);
+    for (const Observation& o : track.observations) {
+      d.number(o.frame);
+      d.number(o.time_s);
+      d.number(static_cast<double>(o.status));
+      if (o.status != TrackStatus::ok) continue;
+      d.matrix(o.pixel);
+      d.matrix(o.covariance);
+    }
+  }
+  return d.hex();
+}
+
+std::string parameters_digest(const FitCase& fit, const Parametrisation& parametrisation) {
+  Digest d;
+  for (const FitVariable& v : parametrisation.variables()) {
+    d.text(v.address);
+    d.number(static_cast<double>(v.transform));
+    for (const double x : {v.initial, v.lower, v.upper, v.prior_sigma.value_or(0)}) d.number(x);
+  }
+  d.text(parametrisation.gauge_layer());
+  for (const double x : {fit.robust_scale, fit.min_sigma, static_cast<double>(fit.first_frame),
+                         static_cast<double>(fit.last_frame), fit.rim_margin})
+    d.number(x);
+  return d.hex();
+}
+
+}  // namespace
+
+FitIdentity fit_identity(const FitInput& input, const FitProblem& problem) {
+  return {{"program", program_digest()},
+          {"scene", scene_digest(input.scene, problem)},
+          {"camera", camera_digest(input.camera)},
+          {"tracks", tracks_digest(input.tracks)},
+          {"parameters", parameters_digest(input.options, problem.parametrisation())}};
+}
+
+}  // namespace rhytid::fitting

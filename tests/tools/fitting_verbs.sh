@@ -1,0 +1,131 @@
+#!/bin/bash
+# render, track, fit and report of the real program on a tiny twin experiment: exit codes, files, one line on errors,
+# and a fit that is killed and goes on to the same bits.
+#   fitting_verbs.sh PROGRAM SCRATCH_FOLDER
+set -u
+program=$1 scratch=$2
+failures=0
+fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+rm -rf "$scratch" && mkdir -p "$scratch" && cd "$scratch" || exit 1
+
+cat >scene.json <<'SCENE'
+{
+  "name": "tiny",
+  "skin": {
+    "surface": {"grid": {"size": ["16 mm", "12 mm"], "cells": [4, 3]}}, "order": 2,
+    "layers": [{"name": "skin", "thickness": "1.5 mm", "order": 1, "youngs_modulus": "50 kPa"}]
+  },
+  "ligaments": {"sources": [{"name": "a", "position": [-2, -1, -1.5], "strength": 1.5, "radius": "4 mm"}]},
+  "base": {"shape": "plane", "stiffness": "0.1 MPa/mm", "onset": "0.02 mm"},
+  "colliders": [
+    {"name": "finger", "shape": "sphere", "radius": "2 mm", "stiffness": "0.1 MPa/mm", "onset": "0.02 mm",
+     "friction": {"coefficient": 0.5, "slip_speed": "2 mm/s"},
+     "path": [{"time": 0, "position": [-4, -3, 2.02]}, {"time": 0.1, "position": [-4, -3, 1.5]},
+              {"time": 0.3, "position": [-2, -3, 1.5]}]}],
+  "time": {"frame_rate": "20 Hz", "frames": 4}
+}
+SCENE
+cat >case.json <<'CASE'
+{
+  "scene": "scene.json",
+  "settings": ["/skin/layers/skin/poissons_ratio=0.45"],
+  "truth": {"settings": ["/colliders/finger/friction/coefficient=0.8"]},
+  "render": {"width": 160, "height": 120, "texture_scale": "0.6 mm", "truth_spacing": 8},
+  "track": {"max_tracks": 60, "min_distance": 6},
+  "fit": {"parameters": [{"address": "/colliders/finger/friction/coefficient", "initial": 0.4, "lower": 0.125}]}
+}
+CASE
+
+# expect CODE ERRORS PATTERN ARGUMENTS...: so many lines with "error:" on stderr (and nothing else when the code is
+# 2), and PATTERN somewhere in stdout and stderr together.
+expect() {
+  local code=$1 errors=$2 pattern=$3 actual
+  shift 3
+  "$program" "$@" --threads 1 >out.txt 2>err.txt
+  actual=$?
+  [ "$actual" = "$code" ] || fail "$*: exit $actual, expected $code: $(cat err.txt)"
+  [ "$(grep -c 'error: ' err.txt)" = "$errors" ] || fail "$*: $(grep -c 'error: ' err.txt) errors: $(cat err.txt)"
+  [ "$code" != 2 ] || [ "$(wc -l <err.txt)" = 1 ] || fail "$*: more than a line on stderr: $(cat err.txt)"
+  cat out.txt err.txt | grep -qE -- "$pattern" || fail "$*: no '$pattern' in: $(cat out.txt err.txt)"
+}
+# written FOLDER FILE...: all there, not empty, and no temporary names left.
+written() {
+  local folder=$1 file
+  shift
+  for file in "$@"; do [ -s "$folder/$file" ] || fail "$folder/$file is missing or empty"; done
+  [ -z "$(find "$folder" -name '*.tmp-*')" ] || fail "left behind: $(find "$folder" -name '*.tmp-*')"
+}
+# The record of a fit without wall clock times.
+record() {
+  python3 - "$1" <<'PYTHON'
+import json, sys
+fit = json.load(open(sys.argv[1] + "/fit.json"))
+for key in ("seconds", "forward_seconds"):
+    del fit[key]
+for step in fit["history"]:
+    del step["seconds"]
+print(json.dumps(fit, indent=1))
+for name in ("residuals.csv", "fitted_scene.json", "answer.txt"):
+    print(open(sys.argv[1] + "/" + name).read())
+PYTHON
+}
+
+# Bad input first.
+expect 2 1 '^rhytid: error: a/tracks.csv: got no file, and no footage a/footage.avi to track, expected tracks, or' \
+  fit case.json -o a
+expect 2 1 '^rhytid: error: --parameters: .*/ligaments/sources/c/strength' \
+  fit case.json -o a --parameters /ligaments/sources/c/strength
+expect 2 1 '^rhytid: error: track: got neither a case nor --video, expected one of the two' track
+expect 2 1 '^rhytid: error: a/fit.json: cannot open' report a
+
+# The main job, tracking included.
+expect 0 0 '^a/footage.avi: 5 frames at 20 Hz, 160 x 120 px' render case.json -o a
+written a footage.avi camera.yaml truth.json truth_tracks.csv truth_motion.bin frame_0000.png
+expect 0 0 'no tracks yet \(a/tracks.csv\): tracking a/footage.avi first' fit case.json -o a
+grep -q '^against the truth: ' out.txt || fail "tracking inside fit: $(cat out.txt)"
+grep -qE '^Status: converged after [0-9]+ forward runs' out.txt || fail "fit: $(cat out.txt)"
+grep -qE '^finger friction coefficient .* 0\.8 +[-+][0-9.]+ +(yes|no)$' out.txt || fail "no truth in the answer: $(cat out.txt)"
+written a tracks.csv overlay.png track.json fit.json residuals.csv fitted_scene.json answer.txt report.html
+grep -q '</html>' a/report.html || fail "report.html is not whole"
+chi=$(python3 -c 'import json; print(json.load(open("a/fit.json"))["reduced_chi_square"])')
+echo "reduced chi-square $chi"
+
+# Killed in the middle, it goes on after the last completed run and ends at the same bits.
+mkdir b && cp a/{footage.avi,camera.yaml,truth.json,tracks.csv} b
+"$program" fit case.json -o b --threads 1 >out.txt 2>err.txt &
+pid=$!
+for _ in $(seq 3000); do [ "$(ls b/evaluations 2>/dev/null | grep -c '^run-[0-9]*\.bin$')" -ge 2 ] && break; sleep 0.01; done
+kill -9 $pid 2>/dev/null || fail "the fit was over before it could be killed"
+wait $pid 2>/dev/null
+[ ! -e b/fit.json ] || fail "the fit was over before it could be killed"
+expect 0 0 'resumed: [0-9]+ runs of an earlier start are in b/evaluations' fit case.json -o b
+grep -qE 'run 2 \([0-9.]+ s then\)' err.txt || fail "runs were not taken from the log: $(cat err.txt)"
+record a >a.txt && record b >b.txt && cmp a.txt b.txt || fail "the resumed fit differs: $(diff a.txt b.txt | head)"
+
+# An address by number is the case's parameter with its bounds, and the same fit; another one sets the log aside.
+expect 3 0 'run 1 \([0-9.]+ s then\)' \
+  fit case.json -o b --parameters /colliders/0/friction/coefficient --max-evaluations 1
+grep -q '"address": "/colliders/finger/friction/coefficient"' b/fit.json && grep -q '"lower": 0.125' b/fit.json ||
+  fail "an address by number lost its bounds"
+
+# What --set changes reaches the record and the report, from any working directory.
+expect 3 0 'evaluations of an earlier fit \(other scene\) are set aside in b/evaluations.old' \
+  fit case.json -o b --max-evaluations 1 \
+  --set '/settings/0=/skin/layers/skin/poissons_ratio=0.4'
+grep -q '"poissons_ratio": 0.4,' b/fitted_scene.json || fail "fitted_scene.json does not have the setting"
+grep -q '"tracks_file": "tracks.csv"' b/fit.json || fail "files of the folder are not named from it"
+(cd / && "$program" report "$scratch/b" --threads 1 >"$scratch/out.txt" 2>"$scratch/err.txt") || fail "report: $(cat err.txt)"
+grep -q 'No picture of the skin' b/report.html && fail "the report did not find its scene"
+
+# A report that cannot be written leaves a finished fit.
+rm -f a/fit.json a/report.html && mkdir a/report.html
+expect 1 1 'error: the fit is complete, but its report could not be written: a/report.html' fit case.json -o a
+record a >again.txt && cmp a.txt again.txt || fail "a finished fit changes when it is run again"
+rmdir a/report.html
+
+# Truth belongs to the rendered footage alone.
+expect 0 0 '^against the truth: .* reduced chi-square for a fit [0-9.]+' track case.json -o a
+cp a/footage.avi other.avi
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o a --video other.avi
+grep -q 'against the truth' out.txt && fail "another video was compared with the truth"
+exit $((failures > 0))

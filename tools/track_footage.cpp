@@ -1,0 +1,135 @@
+#include "tools/track_footage.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+#include <ostream>
+
+#include "fitting/tracking/overlay.h"
+#include "sim/core/error.h"
+#include "sim/output/atomic_file.h"
+#include "sim/scene/load.h"
+#include "sim/scene/scene_model.h"
+#include "tools/render/scene_masks.h"
+#include "tools/render/track_record.h"
+
+namespace rhytid::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double finger_margin_px = 4;  ///< the finger's edge is blurred and throws shadow
+
+/// A frame of the overlay video as a PNG, since not everything shows videos.
+void write_overlay_picture(const std::string& video, int frame, const std::string& path) {
+  cv::VideoCapture capture(video);
+  cv::Mat picture, last;
+  for (int i = 0; i <= frame && capture.read(picture); ++i) last = picture.clone();
+  std::vector<unsigned char> png;
+  if (last.empty() || !cv::imencode(".png", last, png))
+    throw InputError(path, "no picture", "a readable overlay");
+  write_file(path, std::string(png.begin(), png.end()));
+}
+
+std::string in(const std::string& folder, const char* name) {
+  return (fs::path(folder) / name).string();
+}
+
+/// Seeds on the skin, finger masked, as the camera sees both at rest and in every frame.
+void use_camera(const fitting::Case& c, const fitting::Camera& camera, fitting::TrackerOptions& options) {
+  options.camera = camera.name;
+  const Scene scene = load_scene(c.scene, c.scene_settings);
+  const MovingSurface patch = outer_surface(SceneModel(scene).model().mesh, "");
+  options.seeds.region_mask = patch_mask(patch, camera, options.window_px / 2);
+  if (!c.track.mask_finger) return;
+  const Vec3 direction = finger_direction(patch.mean_normal(), camera);
+  options.mask = [scene, direction, camera](const fitting::Frame& frame) {
+    return finger_mask(scene, frame.time_s, direction, camera, finger_margin_px);
+  };
+}
+
+void print_error(const TrackingError& error, std::ostream& out) {
+  char text[400];
+  std::snprintf(text, sizeof(text),
+                "against the truth: rms %.3f px, median %.3f, 95 %% below %.3f; %d of %d observations are "
+                "more than 1 px off (largest %.3f), the others rms %.3f; %.2f times the stated deviation, "
+                "reduced chi-square for a fit %.2f (%d tracks, %d off the skin)",
+                error.rms_px, error.median_px, error.p95_px, error.gross, error.observations,
+                error.largest_px, error.inlier_rms_px, error.normalised, error.reduced_chi_square,
+                error.tracks, error.off_skin);
+  out << text << '\n';
+}
+
+}  // namespace
+
+TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
+                   Progress& progress) {
+  TrackJob job;
+  job.footage.path = video.empty() ? fitting::footage_path(c, folder) : video;
+  job.noise = c.fit;
+  job.options.seeds.max_tracks = c.track.max_tracks;
+  job.options.seeds.min_distance_px = c.track.min_distance;
+  if (c.track.roi) {
+    const auto& r = *c.track.roi;
+    job.options.seeds.region = cv::Rect(static_cast<int>(r[0]), static_cast<int>(r[1]),
+                                        static_cast<int>(r[2]), static_cast<int>(r[3]));
+  }
+  // Rendered footage and its truth lie side by side; another video has nothing to do with that truth.
+  const std::string motion = in(folder, "truth_motion.bin");
+  std::error_code ignored;
+  const fs::path beside = fs::path(folder) / fs::path(fitting::footage_path(c, folder)).filename();
+  if (fs::exists(motion, ignored) && fs::equivalent(job.footage.path, beside, ignored))
+    job.truth_motion = motion;
+
+  const std::string path = fitting::camera_path(c, folder);
+  if (c.camera.empty() && !fs::exists(path)) {
+    progress.warning("no camera: tracks are not limited to the skin and the finger is not masked");
+    return job;
+  }
+  job.camera = fitting::read_camera(path);
+  use_camera(c, *job.camera, job.options);
+  return job;
+}
+
+ExitCode track_footage(const TrackJob& job, const std::string& folder, int threads, Progress& progress,
+                       std::ostream& out) {
+  cv::setNumThreads(threads);
+  fitting::TrackerOptions options = job.options;
+  const std::optional<fitting::Camera>& camera = job.camera;
+  fitting::FrameSource source(job.footage);
+  if (camera && (source.size().width != camera->width || source.size().height != camera->height))
+    throw InputError(
+        job.footage.path,
+        std::to_string(source.size().width) + " x " + std::to_string(source.size().height) + " px",
+        "the size of the camera, " + std::to_string(camera->width) + " x " + std::to_string(camera->height) +
+            " px");
+  progress.stage("track", source.frames_asked());
+  options.progress = [&progress](const fitting::FrameCounts&, int processed, int) {
+    progress.step_done(processed);
+    return !progress.interrupted();
+  };
+  const fitting::TrackerResult result = fitting::track(source, options);
+  if (result.report.end == fitting::TrackerEnd::interrupted) return ExitCode::interrupted;
+  if (result.report.end == fitting::TrackerEnd::source_ended_early)
+    progress.warning(job.footage.path + " ended after " + std::to_string(result.report.frames_processed) +
+                     " of " + std::to_string(result.report.frames_asked) + " frames");
+  fitting::write_tracks(result.tracks, in(folder, "tracks.csv"));
+
+  progress.stage("overlay", 0);
+  fitting::FrameSource again(job.footage);
+  const fitting::OverlayReport overlay =
+      fitting::write_overlay(again, result.tracks, options.camera, in(folder, "overlay.mp4"));
+  write_overlay_picture(overlay.path, 2 * overlay.frames / 3, in(folder, "overlay.png"));
+
+  std::optional<TrackingError> error;
+  if (camera && !job.truth_motion.empty())
+    error = tracking_error(result.tracks, read_motion(job.truth_motion), *camera, job.noise);
+  write_file(in(folder, "track.json"), track_record(result.report, error).dump(2) + "\n");
+  out << in(folder, "tracks.csv") << ": " << fitting::summary(result.report) << '\n';
+  if (error) print_error(*error, out);
+  return ExitCode::ok;
+}
+
+}  // namespace rhytid::tools

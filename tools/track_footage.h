@@ -1,0 +1,36 @@
+// The stage between footage and fit: follows skin points and writes what `rhytid track` writes. Used by the
+// verbs track and fit. Tests: tests/tools/twin_footage_test.cpp, tests/tools/fitting_verbs.sh
+#pragma once
+
+#include <iosfwd>
+#include <optional>
+#include <string>
+
+#include "fitting/cameras.h"
+#include "fitting/case.h"
+#include "fitting/tracking/tracker.h"
+#include "tools/exit_code.h"
+#include "tools/progress.h"
+
+namespace rhytid::tools {
+
+struct TrackJob {
+  fitting::FrameSourceOptions footage;
+  fitting::TrackerOptions options;
+  std::optional<fitting::Camera> camera;  ///< none: no check of the picture's size, no truth
+  fitting::FitCase noise;                 ///< how a fit would weigh the tracks
+  std::string truth_motion;               ///< of the footage, when `render` made it; else empty
+};
+
+/// What a case says about its tracks: footage, seeds, the skin's silhouette, the finger's mask. `video` in
+/// place of the case's footage unless empty. The truth is that of the footage in `folder` which `render`
+/// wrote, and of no other video. Throws InputError.
+TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
+                   Progress& progress);
+
+/// Tracks and writes tracks.csv, overlay.mp4 (or .avi), overlay.png and track.json into `folder`; a summary
+/// on `out`. ok or interrupted. `threads` is for OpenCV. Throws InputError.
+ExitCode track_footage(const TrackJob& job, const std::string& folder, int threads, Progress& progress,
+                       std::ostream& out);
+
+}  // namespace rhytid::tools
