@@ -50,13 +50,13 @@ void place_columns(const TriangleSurface& surface, const TriangleBasis& basis,
 }
 
 // The outward conormal t × n at every node of every boundary edge, t along the edge with the face on its
-// left; at a vertex the mean over its two boundary edges.
+// left; at a vertex the mean over its two boundary edges, and the angle between them.
 void find_rim(const TriangleSurface& surface, const SurfaceEdges& topology, const TriangleBasis& basis,
               Columns& columns) {
   const int p = basis.order(), per_face = basis.num_nodes();
   const LineBasis line(p);
   MatrixX3 sum = MatrixX3::Zero(columns.positions.rows(), 3);
-  std::vector<char> on_rim(columns.positions.rows(), 0);
+  std::vector<std::vector<Vec3>> conormals(static_cast<std::size_t>(columns.positions.rows()));
   for (const SurfaceEdge& edge : topology.edges) {
     if (edge.sides.size() != 1) continue;
     const int face = edge.sides[0] / 3, side = edge.sides[0] % 3;
@@ -73,11 +73,19 @@ void find_rim(const TriangleSurface& surface, const SurfaceEdges& topology, cons
       const Vec3 conormal = tangent.cross(normal).normalized();
       // Two antiparallel conormals (the tip of a slit) leave nothing: then the first edge decides.
       if ((sum.row(along[at]).transpose() + conormal).norm() > 1e-6) sum.row(along[at]) += conormal;
-      on_rim[along[at]] = 1;
+      conormals[along[at]].push_back(conormal);
     }
   }
-  for (int column = 0; column < static_cast<int>(on_rim.size()); ++column)
-    if (on_rim[column]) columns.rim.push_back(column);
+  for (int column = 0; column < static_cast<int>(conormals.size()); ++column) {
+    const std::vector<Vec3>& here = conormals[column];
+    if (here.empty()) continue;
+    columns.rim.push_back(column);
+    double turn = 0;
+    for (std::size_t i = 1; i < here.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        turn = std::max(turn, std::atan2(here[i].cross(here[j]).norm(), here[i].dot(here[j])));
+    columns.rim_turns.push_back(turn);
+  }
   columns.rim_directions.resize(static_cast<int>(columns.rim.size()), 3);
   for (std::size_t i = 0; i < columns.rim.size(); ++i)
     columns.rim_directions.row(i) = sum.row(columns.rim[i]).normalized();

@@ -18,6 +18,7 @@ struct Columns {
   MatrixX3 normals;               ///< [num_columns][3] unit, outward
   std::vector<int> rim;           ///< columns on boundary edges, ascending
   MatrixX3 rim_directions;        ///< [rim][3] unit, tangential, outward from the patch
+  std::vector<double> rim_turns;  ///< [rim] largest angle between the conormals of edges that meet there, rad
 };
 
 /// `vertex_directions` [num_vertices][3] are unit normals at the vertices. A positive `bend_radius` rolls the

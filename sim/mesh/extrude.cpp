@@ -187,6 +187,7 @@ SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options
   mesh.column_normals = std::move(columns.normals);
   mesh.rim_columns = std::move(columns.rim);
   mesh.rim_directions = std::move(columns.rim_directions);
+  mesh.rim_turns = std::move(columns.rim_turns);
   mesh.surface = surface;
   for (int vertex = 0; vertex < surface.vertices.rows(); ++vertex) {
     mesh.vertex_columns.push_back(vertex);

@@ -39,8 +39,9 @@ struct SkinMesh {
   MatrixX3 column_normals;                   ///< [num_columns][3] unit extrusion direction
   std::vector<int> rim_columns;              ///< columns on the boundary of the patch
   MatrixX3 rim_directions;                   ///< [rim_columns][3] unit in-plane outward conormal there
-  std::vector<int> vertex_columns;           ///< column of each vertex of the input surface
-  TriangleSurface surface;                   ///< the input surface (vertices on the cylinder when bent)
+  std::vector<double> rim_turns;    ///< [rim_columns] how far the rim turns there, rad; 0 inside an edge
+  std::vector<int> vertex_columns;  ///< column of each vertex of the input surface
+  TriangleSurface surface;          ///< the input surface (vertices on the cylinder when bent)
 
   int num_nodes() const { return num_columns * num_levels; }
   int node(int column, int level) const { return column * num_levels + level; }

@@ -185,7 +185,11 @@ std::vector<Rule> skin_rules() {
        .type = option,
        .fallback = to_string(skin.rim),
        .options = enum_words<RimCondition>(),
-       .doc = "Boundary condition on the rim of the patch."},
+       .doc =
+           "Boundary condition on the rim of the patch. clamped: held. sliding: its wall moves only within "
+           "itself; where the rim turns by more than 35 degrees (a corner) both in-plane directions are "
+           "held. "
+           "free: not held."},
       {.pointer = "/skin/pre_stretch",
        .type = object,
        .doc = "Tension in the rest shape: how far the skin is stretched there from its unstressed state. "

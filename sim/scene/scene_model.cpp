@@ -31,6 +31,10 @@ SceneModel::SceneModel(Scene scene) : scene_(std::move(scene)) {
   model_.native.resize(last.offset + last.size);
   for (const auto& part : parts_) part->add_terms(scene_, model_, features_);
   model_.constraints = rim_constraints(model_.mesh, scene_.skin.rim);
+  if (scene_.skin.rim == RimCondition::sliding)
+    features_.push_back({"sliding rim", true,
+                         std::to_string(model_.mesh.rim_columns.size()) + " columns, of these " +
+                             std::to_string(rim_corners(model_.mesh).size()) + " corners held in the plane"});
   model_.native = native(scene_);
   model_.finish();
 }

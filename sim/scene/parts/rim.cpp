@@ -4,6 +4,13 @@
 
 namespace rhytid {
 
+std::vector<int> rim_corners(const SkinMesh& mesh) {
+  std::vector<int> corners;
+  for (std::size_t r = 0; r < mesh.rim_columns.size(); ++r)
+    if (mesh.rim_turns[r] > kCornerTurn) corners.push_back(mesh.rim_columns[r]);
+  return corners;
+}
+
 Constraints rim_constraints(const SkinMesh& mesh, RimCondition condition) {
   Constraints c;
   std::vector<int> rim_index(mesh.num_columns, -1);
@@ -16,7 +23,9 @@ Constraints rim_constraints(const SkinMesh& mesh, RimCondition condition) {
     if (rim >= 0 && condition == RimCondition::clamped) continue;
     int frame = -1;
     if (rim >= 0) {
-      // Sliding: the wall of the rim only moves within itself. First axis = outward conormal, fixed.
+      // Sliding: the wall of the rim only moves within itself. First axis = outward conormal, fixed. At a
+      // corner the mean conormal is the diagonal: held alone it would let the corner slip out of both walls,
+      // so the second in-plane axis is fixed as well.
       const Vec3 m = mesh.rim_directions.row(rim).transpose().normalized();
       Vec3 n = mesh.column_normals.row(column).transpose();
       n = (n - n.dot(m) * m).normalized();
@@ -31,6 +40,7 @@ Constraints rim_constraints(const SkinMesh& mesh, RimCondition condition) {
       c.block_nodes.push_back(mesh.node(column, level));
       c.frame_of_block.push_back(frame);
       if (frame >= 0) c.fixed_unknowns.push_back(3 * block);
+      if (frame >= 0 && mesh.rim_turns[rim] > kCornerTurn) c.fixed_unknowns.push_back(3 * block + 1);
     }
   }
   return c;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "tests/sim/mesh/surface_testing.h"
 
@@ -27,6 +28,8 @@ TEST_P(ExtrudeRim, FollowsTheRectangle) {
     if (std::abs(std::abs(x.y()) - 3) < 1e-12) outward.y() = x.y() > 0 ? 1 : -1;
     ASSERT_GT(outward.norm(), 0);
     EXPECT_LT((mesh.rim_directions.row(i).transpose() - outward.normalized()).norm(), 1e-13);
+    const bool corner = outward.x() != 0 && outward.y() != 0;
+    EXPECT_NEAR(mesh.rim_turns[i], corner ? std::numbers::pi / 2 : 0, 1e-13);
   }
 }
 
