@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "sim/core/error.h"
 
@@ -12,24 +13,32 @@ namespace {
 constexpr int D = kDirections;
 using Block = Eigen::Matrix<double, Eigen::Dynamic, D, Eigen::RowMajor>;
 
+std::string where(const StepRecord& record) {
+  return "step " + std::to_string(record.step.index) + " (t = " + std::to_string(record.step.t) + " s): ";
+}
+
 void check_run(const Trajectory& run) {
   if (!run.complete) throw GradientError("the run did not reach its last frame: " + run.failure);
-  for (const StepRecord& step : run.steps)
-    if (step.state.u.size() == 0) throw GradientError("the run kept no states");
+  for (const StepRecord& record : run.steps) {
+    if (record.state.u.size() == 0) throw GradientError("the run kept no states");
+    if (!record.report.converged())
+      throw GradientError(where(record) + "did not converge (" + name(record.report.status) + ", residual " +
+                          std::to_string(record.report.residual) + " N)");
+  }
 }
 
 /// Factors the raw Hessian of a step at its converged state.
 void factor_step(StepProblem& problem, const StepRecord& record, BlockMatrix& matrix, CholeskyFactor& factor,
                  SweepReport& report, VectorXd* residual) {
   const VectorXd q = problem.model().to_unknowns(record.state.u);
+  VectorXd r;
+  if (!std::isfinite(problem.energy(q, &r)))
+    throw GradientError(where(record) + "its state lies outside the domain for these parameters");
   problem.hessian(q, Curvature::raw, matrix);
   if (!factor.factorize(matrix))
-    throw GradientError("step " + std::to_string(record.step.index) +
-                        " (t = " + std::to_string(record.step.t) +
-                        " s): the Hessian at the converged state is not positive definite");
+    throw GradientError(where(record) + "the Hessian at the converged state is not positive definite");
   report.smallest_pivot.push_back(factor.smallest_pivot());
   report.largest_pivot.push_back(factor.largest_pivot());
-  const VectorXd r = problem.model().to_unknowns(problem.residual(record.state.u));
   report.residual.push_back(r.norm());
   if (residual) *residual = r;
 }

@@ -6,9 +6,9 @@
 //   ;  s̄_{i−1} = q_s − R_{s−}ᵀ adj + G_{s−}ᵀ s̄_i ;
 //            θ̄ += −R_θᵀ adj + G_θᵀ s̄_i
 //
-// K is the raw Hessian at the converged state. A run that is incomplete, kept no states or has a step whose
-// Hessian does not factor is refused (GradientError): the implicit function theorem does not hold there, a
-// number would be wrong.
+// K is the raw Hessian at the converged state. A run that is incomplete, kept no states, has a step that did
+// not converge, lies outside the domain or whose Hessian does not factor is refused (GradientError): the
+// implicit function theorem does not hold there, a number would be wrong.
 //
 // Source   DESIGN section 4; model-notes "Suggested algebra".    Units  θ in native units (sim/time/model.h).
 // Tests    tests/adjoint

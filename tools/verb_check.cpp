@@ -93,10 +93,10 @@ ordered_json to_json(const Findings& f) {
                           {"points_per_element", t.points_per_element},
                           {"history", t.history},
                           {"counters",
-                           {{"energy", counters.energy},
-                            {"gradient", counters.gradient},
-                            {"hessian", counters.hessian},
-                            {"update", counters.update}}}});
+                           {{"energy", long{counters.energy}},
+                            {"gradient", long{counters.gradient}},
+                            {"hessian", long{counters.hessian}},
+                            {"update", long{counters.update}}}}});
   }
   j["features"] = ordered_json::array();
   for (const FeatureNote& n : f.scene_model.features())

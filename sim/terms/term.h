@@ -9,6 +9,7 @@
 // only way in and out.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -61,9 +62,25 @@ struct TermStepData {
   std::vector<std::vector<double>> theta;  ///< per group: one row, or [num_elements·num_points][ntheta]
 };
 
+/// A count that several threads may raise; reads as a number, copies as one.
+class WorkCount {
+ public:
+  WorkCount() = default;
+  WorkCount(const WorkCount& other) : n_(other.n_.load(std::memory_order_relaxed)) {}
+  WorkCount& operator=(const WorkCount& other) {
+    n_.store(other.n_.load(std::memory_order_relaxed), std::memory_order_relaxed);
+    return *this;
+  }
+  void operator++() { n_.fetch_add(1, std::memory_order_relaxed); }
+  operator long() const { return n_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<long> n_{0};
+};
+
 /// Counts of work actually done; a scene without a feature must leave its counters at zero (tested).
 struct TermCounters {
-  long energy = 0, gradient = 0, hessian = 0, update = 0;
+  WorkCount energy, gradient, hessian, update;
 };
 
 class Term {
@@ -144,9 +161,6 @@ class Term {
   const TermCounters& counters() const { return counters_; }
 
  private:
-  ElementView view(const TermGroup& group, int group_index, int element, const StepInfo& step,
-                   const TermStepData& data) const;
-
   std::string name_;
   const KernelTable* kernels_;
   std::shared_ptr<const void> law_;

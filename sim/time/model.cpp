@@ -113,8 +113,12 @@ double StepProblem::energy(const VectorXd& q, VectorXd* gradient) {
 
 VectorXd StepProblem::residual(const VectorXd& u) const {
   VectorXd g = VectorXd::Zero(u.size());
-  for (std::size_t k = 0; k < data_.size(); ++k)
-    (void)model_->terms[k].energy(step_, data_[k], u, &g, nullptr);
+  for (std::size_t k = 0; k < data_.size(); ++k) {
+    const double energy = model_->terms[k].energy(step_, data_[k], u, &g, nullptr);
+    if (!std::isfinite(energy))
+      throw ContractError("StepProblem::residual: outside the domain of the term '" +
+                          model_->terms[k].name() + "'");
+  }
   return g;
 }
 

@@ -86,7 +86,9 @@ class StepProblem final : public Objective {
   const StepInfo& step() const { return step_; }
   const State& old() const { return *old_; }
   const TermStepData& data(std::size_t term) const { return data_[term]; }
-  /// Residual in displacement components [num_nodes·3], fixed components included (reactions).
+  /// Residual in displacement components [num_nodes·3], fixed components included (reactions). Throws
+  /// ContractError naming the term when u lies outside the domain (an inverted element, a point behind the
+  /// base): there is no residual there.
   VectorXd residual(const VectorXd& u) const;
   /// Energy of each term at u, mJ.
   std::vector<double> term_energies(const VectorXd& u) const;

@@ -190,6 +190,15 @@ TEST(Sweeps, RefuseWhatHasNoGradient) {
   broken = c.run;
   for (StepRecord& step : broken.steps) step.state = {};
   expect_refused(native, broken, "kept no states");
+  broken = c.run;
+  broken.steps[1].report.status = MinimiserStatus::stagnated;
+  expect_refused(native, broken, "did not converge (stagnated");
+  broken = c.run;
+  broken.steps[1].state.u *= 1e3;
+  expect_refused(native, broken, "outside the domain");
+  const StepProblem step(c.model(), native, c.run.steps[1].step, c.run.before(1));
+  EXPECT_THROW((void)step.residual(broken.steps[1].state.u), ContractError)
+      << "an infinite energy has no residual";
   VectorXd negative = native;
   for (const NativeBlock& block : c.model().native_blocks)
     for (const int i : block.stiffness_like) negative[i] = -native[i];

@@ -1,0 +1,84 @@
+// A term in a sweep: tangent and adjoint blocks of a converged step.
+#include <optional>
+
+#include "sim/terms/element_loop.h"
+
+namespace rhytid {
+
+void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorXd& u, const VectorXd& u_old,
+                   const double* s_old, const Directions& dir, double* df, double* ds_new) const {
+  constexpr int D = kDirections;
+  const int nt = kernels_->ntheta, ns = kernels_->ns;
+  if (!df && (ns == 0 || !ds_new)) return;
+  std::vector<std::vector<std::vector<double>>> dtheta;  // per direction, per group
+  for (const VectorXd* direction : dir.dnative) dtheta.push_back(load_theta(step, *direction));
+  // Parameter directions at the points of an element, [nq][nt][D]; empty without any.
+  const auto element_dtheta = [&](std::size_t gi, const TermElement& e) {
+    std::vector<double> dth;
+    if (dtheta.empty()) return dth;
+    dth.assign(static_cast<std::size_t>(e.group.num_points) * nt * D, 0.0);
+    for (std::size_t k = 0; k < dtheta.size(); ++k) {
+      const auto& values = dtheta[k][gi];
+      const bool per_point = values.size() > static_cast<std::size_t>(nt);
+      const std::size_t first = static_cast<std::size_t>(e.index) * e.group.num_points;
+      for (int q = 0; q < e.group.num_points; ++q)
+        for (int s = 0; s < nt; ++s)
+          dth[(static_cast<std::size_t>(q) * nt + s) * D + k] = values[per_point ? (first + q) * nt + s : s];
+    }
+    return dth;
+  };
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
+    const TermGroup& g = groups_[gi];
+    const std::size_t width = static_cast<std::size_t>(3) * g.num_nodes * D;
+    std::optional<ElementVectors> forces;
+    if (df) forces.emplace(g, 3 * D);
+    for_elements(*this, gi, step, data, [&](const TermElement& e) {
+      std::vector<double> du(dir.du ? width : 0), du_old(dir.du_old ? width : 0);
+      if (dir.du) e.gather(dir.du, 3 * D, du.data());
+      if (dir.du_old) e.gather(dir.du_old, 3 * D, du_old.data());
+      const std::vector<double> dth = element_dtheta(gi, e);
+      kernels_->tangent(law_.get(), e.view, e.gather(u).data(), e.gather(u_old).data(),
+                        s_old ? s_old + e.point * ns : nullptr, dir.du ? du.data() : nullptr,
+                        dir.du_old ? du_old.data() : nullptr,
+                        dir.ds_old ? dir.ds_old + e.point * ns * D : nullptr,
+                        dth.empty() ? nullptr : dth.data(), df ? forces->of(e) : nullptr,
+                        ds_new ? ds_new + e.point * ns * D : nullptr);
+    });
+    if (df) forces->add_to(df);
+  }
+}
+
+void Term::adjoint_update(const StepInfo& step, const TermStepData& data, const VectorXd& u,
+                          const double* s_bar, VectorXd& u_bar) const {
+  if (kernels_->ns == 0) return;
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
+    ElementVectors bars(groups_[gi], 3);
+    for_elements(*this, gi, step, data, [&](const TermElement& e) {
+      kernels_->adjoint_update(law_.get(), e.view, e.gather(u).data(),
+                               data.prepared.data() + e.point * kernels_->np, s_bar + e.point * kernels_->ns,
+                               bars.of(e));
+    });
+    bars.add_to(u_bar.data());
+  }
+}
+
+void Term::adjoint_step(const StepInfo& step, const TermStepData& data, const VectorXd& u,
+                        const VectorXd& u_old, const double* s_old, const VectorXd& adj, const double* s_bar,
+                        VectorXd& u_old_bar, double* s_old_bar, VectorXd& native_bar) const {
+  const int nt = kernels_->ntheta, ns = kernels_->ns;
+  std::vector<double> theta_bar(static_cast<std::size_t>(num_points_) * nt, 0.0);
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
+    ElementVectors bars(groups_[gi], 3);
+    for_elements(*this, gi, step, data, [&](const TermElement& e) {
+      kernels_->adjoint_step(law_.get(), e.view, e.gather(u).data(), e.gather(u_old).data(),
+                             s_old ? s_old + e.point * ns : nullptr,
+                             data.prepared.data() + e.point * kernels_->np, e.gather(adj).data(),
+                             s_bar ? s_bar + e.point * ns : nullptr, bars.of(e),
+                             s_old_bar ? s_old_bar + e.point * ns : nullptr, theta_bar.data() + e.point * nt);
+    });
+    if (kernels_->np > 0) bars.add_to(u_old_bar.data());
+  }
+  add_theta_transpose(step, theta_bar, native_bar);
+}
+
+}  // namespace rhytid
