@@ -9,6 +9,7 @@
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
 #include "sim/terms/kernel_table.h"
+#include "tools/earlier_run.h"
 #include "tools/frame_writer.h"
 #include "tools/run_checkpoint.h"
 #include "tools/run_record.h"
@@ -67,8 +68,16 @@ class ForwardRun {
   }
 
   void begin(const State& rest) {
-    std::error_code ignored;
-    std::filesystem::remove(folder_ + "/state.bin", ignored);
+    const auto earlier = files_of_earlier_run(folder_);
+    record_.write("running");  // from here on the folder is this run's, also when it is killed below
+    for (const std::filesystem::path& file : earlier) {
+      std::error_code error;
+      if (!std::filesystem::remove(file, error) && error)
+        throw InputError(file.string() + ": cannot be removed (" + error.message() + ")");
+    }
+    if (!earlier.empty())
+      context_.progress.note("removed " + std::to_string(earlier.size()) + " files of an earlier run in " +
+                             folder_);
     // A settling step leads to frame 0 and writes it then.
     if (!scene_model_.run_options().settle) frames_.write(0, rest);
     write_table();
@@ -173,7 +182,7 @@ class Simulate : public Verb {
         "the next one starts, so that a run that is stopped or does not converge leaves whole files. A "
         "step that fails is halved up to /time/max_bisections times; then the run ends with exit code 3. "
         "After Ctrl-C the same command with --resume continues from the last whole frame and ends at the "
-        "same bits.",
+        "same bits. A new run into the folder of an earlier one removes that one's files, and nothing else.",
         "scene.json, and the mesh it names",
         "run.json (versions, scene after defaults, schemes, timings, why it ended); steps.csv (energies, "
         "iterations, residual, min J, contact forces per step); frames.pvd (volume, Lagrange wedges) and "

@@ -88,6 +88,18 @@ expect 0 any 'written to' simulate tiny.json -o run_b "${small[@]}" --set /time/
 [ "$(ls run_b/frames | tr '\n' ' ')" = "frame_0000.vtu frame_0002.vtu frame_0003.vtu " ] || fail "every 2: $(ls run_b/frames)"
 [ ! -e run_b/pictures ] && [ ! -e run_b/steps.csv ] || fail "run_b has files that the scene turned off"
 
+# A shorter run into the same folder: no frame of the longer one stays, and nothing that is not a run's.
+echo mine >run_a/notes.txt; echo mine >run_a/frames/frame_12.vtu; echo mine >run_a/pictures/shaded_0003.jpg
+expect 0 any 'removed [0-9]+ files of an earlier run' simulate tiny.json -o run_a "${small[@]}" --set /time/frames=2 \
+  --set /output/pictures=false
+[ "$(ls run_a/frames | tr '\n' ' ')" = "frame_0000.vtu frame_0001.vtu frame_0002.vtu frame_12.vtu " ] ||
+  fail "stale frames: $(ls run_a/frames)"
+[ "$(ls run_a/pictures)" = shaded_0003.jpg ] || fail "stale pictures: $(ls run_a/pictures)"
+[ "$(cat run_a/notes.txt run_a/frames/frame_12.vtu)" = "$(printf 'mine\nmine')" ] || fail "files of others in run_a"
+mkdir -p foreign/frames && echo mine >foreign/frames/frame_0009.vtu
+expect 2 1 'frame_0009.vtu in a folder without the run.json' simulate tiny.json -o foreign "${small[@]}"
+[ "$(cat foreign/frames/frame_0009.vtu)" = mine ] && [ ! -e foreign/run.json ] || fail "a foreign folder was touched"
+
 # Does not converge: one error line among the progress, partial results.
 expect 3 any 'error: frame 1.*0 of 4 frames are kept' simulate tiny.json -o run_c "${small[@]}" \
   --set /solver/max_iterations=1 --set /time/max_bisections=0

@@ -1,0 +1,19 @@
+// What an earlier `simulate` left in the folder of a new one.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace rhytid::tools {
+
+/// Files of the names that `simulate` gives: frames/frame_0007.vtu, surface/frame_0007.vtp, pictures/
+/// shaded_0007.png and displacement_0007.png, frames.pvd, surface.pvd, steps.csv, state.bin. Nothing else,
+/// whatever lies beside them, no links and no folders. Sorted.
+///
+/// A new run removes them, so that no frame of a longer or finer earlier run stays behind its own. Throws
+/// InputError when there are such files in a folder without the run.json of a run: they are not known to be
+/// ours.
+std::vector<std::filesystem::path> files_of_earlier_run(const std::string& folder);
+
+}  // namespace rhytid::tools
