@@ -113,6 +113,12 @@ void fields(Archive& archive, T& ligaments) {
   }
 }
 
+template <class Archive, FieldsOf<PointsScene> T>
+void fields(Archive& archive, T& points) {
+  archive("file", points.file);
+  archive.scale("mm_per_unit", "unit", points.mm_per_unit);
+}
+
 template <class Archive, FieldsOf<BaseScene> T>
 void fields(Archive& archive, T& base) {
   archive("shape", base.shape);
@@ -122,6 +128,8 @@ void fields(Archive& archive, T& base) {
   archive("radius", base.radius);
   archive("normal", base.normal);
   archive("imls_support", base.imls_support);
+  archive("imls_kernel", base.imls_kernel);
+  archive("points", base.points);
 }
 
 template <class Archive, FieldsOf<FrictionScene> T>

@@ -18,6 +18,7 @@ json vector_json(const Vec3& v) {
 
 std::vector<Rule> contact_rules() {
   const BaseScene base;
+  const PointsScene points;
   const ColliderScene collider;
   const FrictionScene friction;
   return {
@@ -28,7 +29,7 @@ std::vector<Rule> contact_rules() {
        .type = option,
        .fallback = to_string(base.shape),
        .options = enum_words<ShapeKind>(),
-       .doc = "imls is built from the inner surface at rest."},
+       .doc = "imls is built from the inner surface at rest, or from /base/points."},
       {.pointer = "/base/stiffness",
        .type = number,
        .dimension = dimension::pressure_per_length,
@@ -62,7 +63,32 @@ std::vector<Rule> contact_rules() {
        .dimension = dimension::length,
        .fallback = base.imls_support,
        .min = 0,
-       .doc = "Support h of the imls kernel; 0 = three times the median node spacing."},
+       .doc = "Support h of the imls kernel; 0 = three times the median spacing of its points."},
+      {.pointer = "/base/imls_kernel",
+       .type = option,
+       .fallback = base.imls_kernel,
+       .options = {"smooth", "literal"},
+       .doc =
+           "Weight of a point at distance d: smooth (1 - (d/h)^2)^4; literal (1 - d/h)^4, as published, with "
+           "a cone at every point."},
+      {.pointer = "/base/points",
+       .type = object,
+       .doc = "Points of the bone with outward normals, for the shape imls, in place of the inner surface."},
+      {.pointer = "/base/points/file",
+       .type = path,
+       .is_required = true,
+       .doc = "Point cloud: .ply (x y z nx ny nz), .obj (v and vn), .xyz or .txt (x y z nx ny nz per line)."},
+      {.pointer = "/base/points/mm_per_unit",
+       .type = number,
+       .fallback = points.mm_per_unit,
+       .min = 0,
+       .min_is_open = true,
+       .rival = "unit",
+       .doc = "Millimetres per unit of the file."},
+      {.pointer = "/base/points/unit",
+       .type = option,
+       .options = {"mm", "cm", "m", "in"},
+       .doc = "Unit of the file, in place of mm_per_unit."},
       {.pointer = "/colliders",
        .type = array,
        .fallback = json::array(),

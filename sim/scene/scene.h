@@ -78,15 +78,22 @@ struct FrictionScene {
   std::string mollifier = "quintic";  ///< quintic (publication) | quadratic (IPC)
 };
 
+struct PointsScene {
+  std::string file;  ///< resolved path
+  double mm_per_unit = 1;
+};
+
 struct BaseScene {
   ShapeKind shape =
-      ShapeKind::plane;         ///< plane | sphere | imls, built from the rest inner surface unless given
+      ShapeKind::plane;         ///< plane | sphere | imls of the rest inner surface, or of `points` if given
   double stiffness = 1;         ///< kappa, MPa/mm
   double onset = 1e-3;          ///< eps_g, mm (0 = C¹ literal penalty)
   Vec3 centre = Vec3::Zero();   ///< sphere centre or a plane point, mm
   double radius = 0;            ///< sphere, mm
   Vec3 normal = Vec3::UnitZ();  ///< plane
-  double imls_support = 0;      ///< h, mm (0 = 3 × median node spacing)
+  double imls_support = 0;      ///< h, mm (0 = 3 × median point spacing)
+  std::string imls_kernel = "smooth";  ///< smooth (1 − d²/h²)⁴ | literal (1 − d/h)⁴
+  std::optional<PointsScene> points;   ///< imls: a cloud with normals in place of the inner surface
 };
 
 struct PathKnot {

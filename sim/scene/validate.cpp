@@ -277,6 +277,9 @@ void check_consistency(const LocatedJson& scene) {
     if (base["shape"] == "sphere" && base["radius"].get<double>() <= 0)
       throw InputError(scene.where("/base/radius") + ": /base/radius", shown_json(base["radius"]),
                        "a length > 0 mm, since the base is a sphere");
+    if (base.contains("points") && base["shape"] != "imls")
+      throw InputError(scene.where("/base/points") + ": /base/points", shown_json(base["points"]),
+                       "nothing, since only the shape imls has points");
   }
   for (size_t i = 0; i < root["colliders"].size(); ++i) {
     const json& collider = root["colliders"][i];

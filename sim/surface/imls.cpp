@@ -6,6 +6,7 @@
 #include <nanoflann.hpp>
 
 #include "sim/core/error.h"
+#include "sim/surface/point_lattice.h"
 
 namespace rhytid {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 // a point that the sum (which computes the distance itself) would count.
 constexpr double kSearchSlack = 1 + 1e-10;
 
-struct PointCloud {
+struct TreePoints {
   const MatrixX3& points;
   std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(points.rows()); }
   double kdtree_get_pt(int i, std::size_t k) const { return points(i, static_cast<Eigen::Index>(k)); }
@@ -25,7 +26,7 @@ struct PointCloud {
 };
 
 using KdTree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointCloud>, PointCloud, 3, int>;
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, TreePoints>, TreePoints, 3, int>;
 
 /// nanoflann result set: all indices within a squared radius, unordered.
 struct IndicesWithin {
@@ -73,7 +74,7 @@ struct LiteralKernel {
 /// nothing (on a plane σ is round-off and all curvature vanishes with it). No underflow to guard against: 1 −
 /// q ≥ 2⁻⁵³ inside the support, hence W ≥ 2⁻²¹².
 template <JetOrder order, class Samples, class Kernel>
-GapJet imls_sum(const Samples& samples, const std::vector<int>& candidates, const Vec3& x,
+GapJet imls_sum(const Samples& samples, std::span<const int> candidates, const Vec3& x,
                 const Kernel& kernel) {
   double s0 = 0, w = 0, w_sigma = 0;  // W = Σ θ, Σ θ σ
   bool supported = false;
@@ -126,8 +127,8 @@ GapJet imls_sum(const Samples& samples, const std::vector<int>& candidates, cons
 }
 
 template <class Samples, class Kernel>
-GapJet imls_sum(const Samples& samples, const std::vector<int>& candidates, const Vec3& x,
-                const Kernel& kernel, JetOrder order) {
+GapJet imls_sum(const Samples& samples, std::span<const int> candidates, const Vec3& x, const Kernel& kernel,
+                JetOrder order) {
   switch (order) {
     case JetOrder::gap:
       return imls_sum<JetOrder::gap>(samples, candidates, x, kernel);
@@ -161,7 +162,7 @@ class ImlsSurface::Tree {
 
  private:
   MatrixX3 points_;
-  PointCloud cloud_;
+  TreePoints cloud_;
   KdTree index_;
 };
 
@@ -184,6 +185,9 @@ ImlsSurface::ImlsSurface(const MatrixX3& points, const MatrixX3& normals, const 
     samples_.push_back({points.row(i).transpose(), normal / length});
   }
   tree_ = std::make_unique<const Tree>(points);
+  if (!options.cached_neighbours) return;
+  auto lattice = std::make_unique<const PointLattice>(points, support_);
+  if (lattice->usable()) lattice_ = std::move(lattice);
 }
 
 ImlsSurface::~ImlsSurface() = default;
@@ -194,13 +198,14 @@ void ImlsSurface::search(const Vec3& x, double radius, std::vector<int>* found) 
   std::sort(found->begin(), found->end());
 }
 
-GapJet ImlsSurface::sum(const Vec3& x, const std::vector<int>& candidates, JetOrder order) const {
+GapJet ImlsSurface::sum(const Vec3& x, std::span<const int> candidates, JetOrder order) const {
   if (kernel_ == ImlsKernel::smooth)
     return imls_sum(samples_, candidates, x, SmoothKernel{1 / (support_ * support_)}, order);
   return imls_sum(samples_, candidates, x, LiteralKernel{1 / support_, epsilon_ * epsilon_}, order);
 }
 
 GapJet ImlsSurface::evaluate(const Vec3& x, JetOrder order) const {
+  if (lattice_) return sum(x, lattice_->near(x), order);
   thread_local std::vector<int> found;  // scratch only: emptied by every search
   search(x, support_, &found);
   return sum(x, found, order);
@@ -211,27 +216,9 @@ bool ImlsSurface::behind(const Vec3& x) const {
   return sample.normal.dot(x - sample.point) < 0;
 }
 
-ImlsSurface::Neighbours ImlsSurface::neighbours(const Vec3& x, double reach) const {
-  require(reach >= 0, "ImlsSurface: reach of a neighbour list must be >= 0");
-  Neighbours near;
-  near.centre_ = x;
-  near.reach_ = reach;
-  search(x, support_ + reach, &near.points_);
-  near.points_.shrink_to_fit();
-  return near;
-}
-
-bool ImlsSurface::covers(const Neighbours& near, const Vec3& x) {
-  return near.reach_ >= 0 && (x - near.centre_).squaredNorm() <= near.reach_ * near.reach_;
-}
-
-GapJet ImlsSurface::evaluate(const Vec3& x, const Neighbours& near, JetOrder order) const {
-  return covers(near, x) ? sum(x, near.points_, order) : evaluate(x, order);
-}
-
 double default_imls_support(const MatrixX3& points) {
   require(points.rows() >= 2, "default_imls_support: needs at least two points");
-  const PointCloud cloud{points};
+  const TreePoints cloud{points};
   KdTree index(3, cloud);
   index.buildIndex();
   const double size = (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();

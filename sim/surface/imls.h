@@ -16,11 +16,14 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "sim/surface/implicit_shape.h"
 
 namespace rhytid {
+
+class PointLattice;
 
 enum class ImlsKernel { smooth, literal };
 
@@ -28,6 +31,9 @@ struct ImlsOptions {
   double support = 0;  ///< h, mm; 0 = three median point spacings
   ImlsKernel kernel = ImlsKernel::smooth;
   double literal_epsilon = 0;  ///< ε of the literal kernel, mm; 0 = 1e-3 h
+  /// Neighbour lists are made once for all queries (PointLattice). Without, every query searches a tree: the
+  /// same bits, slower.
+  bool cached_neighbours = true;
 };
 
 /// How much of the jet to compute; what is left out stays zero. The parts that are computed have the same
@@ -36,22 +42,6 @@ enum class JetOrder { gap, gradient, hessian };
 
 class ImlsSurface final : public ImplicitShape {
  public:
-  /// Candidate points for queries near `centre`: a plain value that the caller keeps, one per query point, so
-  /// the surface itself has no mutable state.
-  class Neighbours {
-   public:
-    /// Number of candidates (in ascending order of point index).
-    std::size_t size() const { return points_.size(); }
-    const Vec3& centre() const { return centre_; }
-    double reach() const { return reach_; }
-
-   private:
-    friend class ImlsSurface;
-    Vec3 centre_ = Vec3::Zero();
-    double reach_ = -1;  // a default-made list covers nothing: every query searches
-    std::vector<int> points_;
-  };
-
   /// points [n][3] mm, normals [n][3] of any length > 0 (stored normalised). Throws ContractError when there
   /// is no point, sizes differ, something is not finite, a normal is zero, or the support is not positive.
   ImlsSurface(const MatrixX3& points, const MatrixX3& normals, const ImlsOptions& options = {});
@@ -61,16 +51,6 @@ class ImlsSurface final : public ImplicitShape {
   GapJet evaluate(const Vec3& x, JetOrder order) const;
   /// True when x lies below the tangent plane of the nearest point.
   bool behind(const Vec3& x) const override;
-
-  /// Every point within h + reach of x (reach in mm, ≥ 0).
-  Neighbours neighbours(const Vec3& x, double reach) const;
-  /// The same bits as evaluate(x, order). Exact by construction: while |x − centre| ≤ reach the list holds
-  /// every point within h of x (triangle inequality) and the points outside the support are skipped; further
-  /// away the list is ignored and the tree is searched again. So `reach` decides speed only; about h/4 is a
-  /// good choice.
-  GapJet evaluate(const Vec3& x, const Neighbours& near, JetOrder order = JetOrder::hessian) const;
-  /// Whether `near` still spares the search at x.
-  static bool covers(const Neighbours& near, const Vec3& x);
 
   double support() const { return support_; }
   int num_points() const { return static_cast<int>(samples_.size()); }
@@ -87,9 +67,10 @@ class ImlsSurface final : public ImplicitShape {
   double epsilon_ = 0;
   ImlsKernel kernel_ = ImlsKernel::smooth;
   std::unique_ptr<const Tree> tree_;
+  std::unique_ptr<const PointLattice> lattice_;  // null: search the tree
 
   void search(const Vec3& x, double radius, std::vector<int>* found) const;
-  GapJet sum(const Vec3& x, const std::vector<int>& candidates, JetOrder order) const;
+  GapJet sum(const Vec3& x, std::span<const int> candidates, JetOrder order) const;
 };
 
 /// Three times the median distance from a point to its nearest distinct neighbour, mm. points [n][3].

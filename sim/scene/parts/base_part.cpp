@@ -2,6 +2,7 @@
 
 #include "sim/core/error.h"
 #include "sim/surface/imls.h"
+#include "sim/surface/point_cloud.h"
 #include "sim/surface/shapes.h"
 #include "sim/terms/contact_law.h"
 #include "sim/terms/geometry.h"
@@ -21,7 +22,25 @@ std::shared_ptr<const ImplicitShape> base_shape(const BaseScene& base, const Ski
   }
   ImlsOptions options;
   options.support = base.imls_support;
-  return std::make_shared<ImlsSurface>(inner_rest_nodes(mesh), mesh.column_normals, options);
+  options.kernel = base.imls_kernel == "literal" ? ImlsKernel::literal : ImlsKernel::smooth;
+  if (!base.points)
+    return std::make_shared<ImlsSurface>(inner_rest_nodes(mesh), mesh.column_normals, options);
+  const PointCloud cloud = read_point_cloud(base.points->file, base.points->mm_per_unit);
+  return std::make_shared<ImlsSurface>(cloud.points, cloud.normals, options);
+}
+
+/// Bone whose normals point away from the skin would pull instead of push: refused.
+void refuse_inside_out(const ImplicitShape& shape, const SkinMesh& mesh, const std::string& file) {
+  const MatrixX3 inner = inner_rest_nodes(mesh);
+  int towards = 0, away = 0;
+  for (int column = 0; column < mesh.num_columns; ++column) {
+    const Vec3 x = inner.row(column), n = mesh.column_normals.row(column);
+    const GapJet jet = shape.evaluate(x);
+    if (jet.supported) ++(jet.gradient.dot(n) > 0 ? towards : away);
+  }
+  if (away > towards)
+    throw InputError(file, "normals that point away from the skin",
+                     "normals out of the bone, towards the skin");
 }
 
 /// An IMLS surface stands where its points are; the others are moved to their centre.
@@ -39,6 +58,7 @@ void BasePart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
   const BaseScene& b = *scene.base;
   model.shapes.push_back(base_shape(b, model.mesh));
   const ImplicitShape* shape = model.shapes.back().get();
+  if (b.points) refuse_inside_out(*shape, model.mesh, b.points->file);
   const Vec3 centre = base_centre(b);
   Term term("base contact", contact_kernels(), ContactLaw{shape, b.onset});
   TermGroup g = surface_group(model.mesh, SkinSide::inner, triangle_rule(contact_degree(scene)));
@@ -55,7 +75,8 @@ void BasePart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
   for (int s = 0; s < 5; ++s) g.theta.push_back(constant_slot(base + s));
   term.add_group(std::move(g));
   model.terms.push_back(std::move(term));
-  features.push_back({"base contact", true, "inner surface"});
+  features.push_back({"base contact", true,
+                      b.points ? "inner surface on the points of " + b.points->file : "inner surface"});
 }
 
 void BasePart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {

@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstring>
 #include <numbers>
 #include <random>
 
 #include "hyper_dual.h"
 #include "sim/core/error.h"
+#include "sim/surface/point_lattice.h"
 
 namespace rhytid {
 namespace {
@@ -198,12 +200,11 @@ TEST(Imls, SaysWhereItDoesNotExist) {
   const Cloud cloud = sphere_cloud(2000, 1);
   const ImlsSurface surface(cloud.points, cloud.normals, {0.18, ImlsKernel::smooth, 0});
   for (const Vec3& x : {Vec3(0, 0, 1.2), Vec3(0, 0, 0), Vec3(1e6, 0, 0)}) {
-    for (const GapJet& jet : {surface.evaluate(x), surface.evaluate(x, surface.neighbours(x, 0.01))}) {
-      EXPECT_FALSE(jet.supported);
-      EXPECT_EQ(jet.gap, 0);
-      EXPECT_EQ(jet.gradient, Vec3::Zero().eval());
-      EXPECT_EQ(jet.hessian, Mat3::Zero().eval());
-    }
+    const GapJet jet = surface.evaluate(x);
+    EXPECT_FALSE(jet.supported);
+    EXPECT_EQ(jet.gap, 0);
+    EXPECT_EQ(jet.gradient, Vec3::Zero().eval());
+    EXPECT_EQ(jet.hessian, Mat3::Zero().eval());
   }
   // Which side such a point is on decides whether a trial state is refused or merely free of contact.
   EXPECT_TRUE(surface.behind(Vec3(0, 0, 0.1)));
@@ -222,27 +223,62 @@ TEST(Imls, SaysWhereItDoesNotExist) {
   EXPECT_FALSE(single.evaluate(Vec3(0, 0, 1)).supported);
 }
 
-TEST(Imls, NeighbourListsDoNotChangeABit) {
+TEST(Imls, CachedNeighboursDoNotChangeABit) {
   std::mt19937 random(25);
-  const Cloud cloud = random_cloud(random, 3000);
+  Cloud cloud = random_cloud(random, 3000);
+  cloud.points.rowwise() += Vec3(70, -40, 25).transpose();
+  const double h = 0.3;
+  int unsupported = 0;
   for (const ImlsKernel kernel : {ImlsKernel::smooth, ImlsKernel::literal}) {
-    const ImlsSurface surface(cloud.points, cloud.normals, {0.3, kernel, 0});
-    for (int trial = 0; trial < 200; ++trial) {
-      const Vec3 centre = random_vector(random);
-      const ImlsSurface::Neighbours near = surface.neighbours(centre, 0.05);
-      // Up to three times the reach: the last ones must notice that the list no longer serves.
-      const Vec3 x = centre + 0.05 * (trial % 4) * random_vector(random).normalized();
-      EXPECT_EQ(ImlsSurface::covers(near, x), (x - centre).squaredNorm() <= 0.05 * 0.05);
-      const GapJet plain = surface.evaluate(x);
-      EXPECT_TRUE(same_bits(plain, surface.evaluate(x, near)));
-      EXPECT_TRUE(same_bits(plain, surface.evaluate(x, ImlsSurface::Neighbours())));
-      const GapJet value = surface.evaluate(x, near, JetOrder::gap);
-      const GapJet slope = surface.evaluate(x, near, JetOrder::gradient);
+    const ImlsSurface cached(cloud.points, cloud.normals, {h, kernel, 0});
+    const ImlsSurface searched(cloud.points, cloud.normals, {h, kernel, 0, false});
+    const auto compare = [&](const Vec3& x) {
+      const GapJet plain = searched.evaluate(x);
+      unsupported += !plain.supported;
+      ASSERT_TRUE(same_bits(plain, cached.evaluate(x))) << x.transpose();
+      const GapJet value = cached.evaluate(x, JetOrder::gap), slope = cached.evaluate(x, JetOrder::gradient);
       EXPECT_EQ(value.gap, plain.gap);
       EXPECT_EQ(slope.gap, plain.gap);
       EXPECT_EQ(slope.gradient, plain.gradient);
+    };
+    for (int trial = 0; trial < 1000; ++trial) {
+      // All around and far beyond the cloud, on its points, and on the very edge of a point's support.
+      const Vec3 p = cloud.points.row(trial).transpose(), direction = random_vector(random).normalized();
+      compare(Vec3(70, -40, 25) + 1.5 * random_vector(random));
+      compare(p);
+      for (const double distance : {h, std::nextafter(h, 0.0), std::nextafter(h, 1.0), 1.2 * h})
+        compare(p + distance * direction);
     }
+    for (const Vec3& x : {Vec3(1e9, 0, 0), Vec3(-1e300, 1e300, 0), Vec3(0, 0, 0)}) compare(x);
   }
+  EXPECT_GT(unsupported, 100);
+}
+
+TEST(PointLattice, HoldsEveryPointInReachAndFewMore) {
+  std::mt19937 random(27);
+  const Cloud cloud = sphere_cloud(5000, 10);
+  const double h = 1;
+  const PointLattice lattice(cloud.points, h);
+  ASSERT_TRUE(lattice.usable());
+  double held = 0, in_reach = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const Vec3 x = (10 + 0.3 * random_vector(random)[0]) * random_vector(random).normalized();
+    const auto near = lattice.near(x);
+    EXPECT_TRUE(std::is_sorted(near.begin(), near.end()));
+    EXPECT_EQ(std::adjacent_find(near.begin(), near.end()), near.end());
+    for (int i = 0; i < 5000; ++i)
+      if ((cloud.points.row(i).transpose() - x).norm() < h) {
+        ++in_reach;
+        EXPECT_TRUE(std::binary_search(near.begin(), near.end(), i));
+      }
+    held += static_cast<double>(near.size());
+  }
+  EXPECT_LT(held / in_reach, 2.2);
+  EXPECT_TRUE(lattice.near(Vec3(std::nan(""), 0, 0)).empty());
+  // A support far below the spacing has more cells than can be numbered; the surface then searches its tree.
+  EXPECT_FALSE(PointLattice(cloud.points, 1e-7).usable());
+  const ImlsSurface needles(cloud.points, cloud.normals, {1e-7, ImlsKernel::smooth, 0});
+  EXPECT_TRUE(needles.evaluate(Vec3(cloud.points.row(7))).supported);
 }
 
 TEST(Imls, ThreadsShareOneSurface) {
@@ -251,11 +287,10 @@ TEST(Imls, ThreadsShareOneSurface) {
   const ImlsSurface surface(cloud.points, cloud.normals, {0.3, ImlsKernel::smooth, 0});
   std::vector<Vec3> queries;
   for (int i = 0; i < 2000; ++i) queries.push_back(random_vector(random));
-  const ImlsSurface::Neighbours near = surface.neighbours(Vec3::Zero(), 0.4);
   std::vector<GapJet> alone(queries.size()), together(queries.size());
   for (std::size_t i = 0; i < queries.size(); ++i) alone[i] = surface.evaluate(queries[i]);
 #pragma omp parallel for num_threads(4) schedule(dynamic)
-  for (std::size_t i = 0; i < queries.size(); ++i) together[i] = surface.evaluate(queries[i], near);
+  for (std::size_t i = 0; i < queries.size(); ++i) together[i] = surface.evaluate(queries[i]);
   for (std::size_t i = 0; i < queries.size(); ++i) EXPECT_TRUE(same_bits(alone[i], together[i]));
 }
 
