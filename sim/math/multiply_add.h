@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstring>
 
-#include "sim/math/isa.h"
+#include "sim/math/lanes.h"
 
 namespace rhytid {
 inline namespace RHYTID_ISA {
@@ -13,12 +13,7 @@ inline namespace RHYTID_ISA {
 /// C[i][j] += Σ_k A[k][i] B[k][j], all rows padded to `n8` (multiple of 8); only columns j ≥ i (by tiles) are
 /// formed when `upper` (symmetric blocks). Register tiles of 4 rows by two vectors.
 inline void multiply_add(const double* a, const double* b, int rows, int n8, bool upper, double* c) {
-#ifdef __AVX__
-  constexpr int width = 4;
-#else
-  constexpr int width = 2;
-#endif
-  typedef double Lanes __attribute__((vector_size(8 * width)));
+  constexpr int width = kLanes;
   // Copies, not casts: rows are only aligned to 8 bytes, and GCC drops a lowered alignment of a vector type
   // in deduction.
   const auto load = [](const double* p, Lanes& v) { std::memcpy(&v, p, sizeof v); };

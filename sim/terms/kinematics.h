@@ -9,6 +9,7 @@
 
 #include <cstring>
 
+#include "sim/math/lanes.h"
 #include "sim/math/sym3.h"
 
 namespace rhytid {
@@ -35,22 +36,24 @@ struct ElementView {
 
 inline namespace RHYTID_ISA {
 
-/// Kinematics of a prism point: z = H = ∇u (row-major a, I), e = Y = H + Hᵀ + HᵀH.
+/// Kinematics of a prism point: z = H = ∇u (row-major a, I), e = Y = H + Hᵀ + HᵀH. V is double or Lanes.
 struct PrismKinematics {
   static constexpr int rows = 3, nz = 9, ne = 6;
 
-  static void strain(const double* h, double* y) {
+  template <class V>
+  static void strain(const V* h, V* y) {
     for (int c = 0; c < 6; ++c) {
       const int k = kSymRow[c], l = kSymCol[c];
       y[c] = h[3 * k + l] + h[3 * l + k] + h[k] * h[l] + h[3 + k] * h[3 + l] + h[6 + k] * h[6 + l];
     }
   }
   /// det F − 1 from H.
-  static double det_minus_one_of(const double* h) {
-    const double tr = h[0] + h[4] + h[8];
-    const double minors = h[0] * h[4] - h[1] * h[3] + h[0] * h[8] - h[2] * h[6] + h[4] * h[8] - h[5] * h[7];
-    const double det = h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) +
-                       h[2] * (h[3] * h[7] - h[4] * h[6]);
+  template <class V>
+  static V det_minus_one_of(const V* h) {
+    const V tr = h[0] + h[4] + h[8];
+    const V minors = h[0] * h[4] - h[1] * h[3] + h[0] * h[8] - h[2] * h[6] + h[4] * h[8] - h[5] * h[7];
+    const V det = h[0] * (h[4] * h[8] - h[5] * h[7]) - h[1] * (h[3] * h[8] - h[5] * h[6]) +
+                  h[2] * (h[3] * h[7] - h[4] * h[6]);
     return tr + minors + det;
   }
   static bool feasible(const double* h) { return det_minus_one_of(h) > -1; }
@@ -75,13 +78,15 @@ struct PrismKinematics {
       }
   }
   /// z in natural directions (a, r) from nodal sums, and back: H_aI = Σ_r h_ar ∂ξ_r/∂X_I.
-  static void to_point(const double* natural, const double* ji, double* h) {
+  template <class V>
+  static void to_point(const V* natural, const V* ji, V* h) {
     for (int a = 0; a < 3; ++a)
       for (int i = 0; i < 3; ++i)
         h[3 * a + i] =
             natural[3 * a] * ji[i] + natural[3 * a + 1] * ji[3 + i] + natural[3 * a + 2] * ji[6 + i];
   }
-  static void from_point(const double* p, const double* ji, double weight, double* natural) {
+  template <class V>
+  static void from_point(const V* p, const V* ji, V weight, V* natural) {
     for (int a = 0; a < 3; ++a)
       for (int r = 0; r < 3; ++r)
         natural[3 * a + r] =

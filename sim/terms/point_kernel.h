@@ -18,8 +18,9 @@
 #include <limits>
 
 #include "sim/math/jacobi.h"
-#include "sim/math/multiply_add.h"
+#include "sim/terms/element_sums.h"
 #include "sim/terms/kinematics.h"
+#include "sim/terms/packed_kernel.h"
 
 namespace rhytid {
 
@@ -31,7 +32,9 @@ struct PointKernel {
   static constexpr int ne = Law::ne, nz = Kin::nz, ns = Law::ns, np = Law::np, nt = Law::ntheta,
                        R = Kin::rows;
   static_assert(Law::ne == Kin::ne);
-  static constexpr int max_rows = 3 * 200;  ///< nq·R at most
+  /// The law has a closed-form tangent: energy, gradient and Hessian then run in packs of points.
+  static constexpr bool has_response = requires { Law::num_constants; };
+  static constexpr int max_rows = kMaxRows;
   static constexpr int at_least_one(int n) { return n > 0 ? n : 1; }
 
   static const double* theta(const ElementView& v, int q) {
@@ -41,34 +44,6 @@ struct PointKernel {
     return v.rest ? v.rest + q * Law::nrest : nullptr;
   }
 
-  /// natural[a][row] = Σ_i u[i][a] table[row][i].
-  static void gather(const ElementView& v, const double* u, double (*natural)[max_rows]) {
-    const int rows = v.num_points * R;
-    for (int a = 0; a < 3; ++a) std::memset(natural[a], 0, sizeof(double) * static_cast<std::size_t>(rows));
-    for (int i = 0; i < v.num_nodes; ++i) {
-      const double* t = v.rows_by_node + static_cast<std::size_t>(i) * v.padded_rows;
-      const double ux = u[3 * i], uy = u[3 * i + 1], uz = u[3 * i + 2];
-      for (int k = 0; k < rows; ++k) {
-        natural[0][k] += ux * t[k];
-        natural[1][k] += uy * t[k];
-        natural[2][k] += uz * t[k];
-      }
-    }
-  }
-  /// f[i][a] += Σ_row natural[a][row] table[row][i].
-  static void scatter(const ElementView& v, const double (*natural)[max_rows], double* f) {
-    const int rows = v.num_points * R;
-    for (int i = 0; i < v.num_nodes; ++i) {
-      const double* t = v.rows_by_node + static_cast<std::size_t>(i) * v.padded_rows;
-      double s[3] = {0, 0, 0};
-      for (int k = 0; k < rows; ++k) {
-        s[0] += natural[0][k] * t[k];
-        s[1] += natural[1][k] * t[k];
-        s[2] += natural[2][k] * t[k];
-      }
-      for (int a = 0; a < 3; ++a) f[3 * i + a] += s[a];
-    }
-  }
   static void point(const ElementView& v, const double (*natural)[max_rows], int q, double* z) {
     double local[nz];
     for (int a = 0; a < 3; ++a)
@@ -87,7 +62,7 @@ struct PointKernel {
                       double* prepared) {
     if constexpr (np > 0) {
       double natural[3][max_rows], z[nz], e[ne];
-      gather(v, u_old, natural);
+      gather<R>(v, u_old, natural);
       for (int q = 0; q < v.num_points; ++q) {
         point(v, natural, q, z);
         Kin::strain(z, e);
@@ -99,8 +74,16 @@ struct PointKernel {
   /// Energy; adds to f[n][3] unless null. +inf outside the domain (f is then meaningless).
   static double energy(const Law& law, const ElementView& v, const double* u, const double* prepared,
                        double* f) {
+    if constexpr (has_response)
+      return PackedKernel<Law, Kin>::energy(law, v, u, prepared, f);
+    else
+      return energy_by_points(law, v, u, prepared, f);
+  }
+  /// The same without packs.
+  static double energy_by_points(const Law& law, const ElementView& v, const double* u,
+                                 const double* prepared, double* f) {
     double natural[3][max_rows], out[3][max_rows], z[nz], e[ne], sigma[ne], total = 0;
-    gather(v, u, natural);
+    gather<R>(v, u, natural);
     for (int q = 0; q < v.num_points; ++q) {
       point(v, natural, q, z);
       if (!Kin::feasible(z)) return std::numeric_limits<double>::infinity();
@@ -118,30 +101,24 @@ struct PointKernel {
       }
       put_point(v, p, q, out);
     }
-    if (f) scatter(v, out, f);
+    if (f) scatter<R>(v, out, f);
     return total;
   }
 
-  /// Dense Hessian [3n][3n], node-major, full. False when it is zero. `work` holds 6·npad² +
-  /// 6·kHessianRows·npad + kHessianRows·npad doubles.
+  /// Dense Hessian [3n][3n], node-major, full. False when it is zero. `work` as HessianBlocks wants it.
   static bool hessian(const Law& law, const ElementView& v, const double* u, const double* prepared,
                       bool projected, double* work, double* dense) {
-    const int n8 = v.padded_nodes, n = v.num_nodes;
-    double* blocks = work;                                       // 6 blocks (a ≤ b) [npad][npad]
-    double* t = blocks + 6 * static_cast<std::size_t>(n8) * n8;  // 6 × [kHessianRows][npad]
-    double* g = t + 6 * static_cast<std::size_t>(kHessianRows) * n8;
+    if constexpr (has_response)
+      return PackedKernel<Law, Kin>::hessian(law, v, u, prepared, projected, work, dense);
+    else
+      return hessian_by_points(law, v, u, prepared, projected, work, dense);
+  }
+  /// The same without packs, by dual numbers.
+  static bool hessian_by_points(const Law& law, const ElementView& v, const double* u, const double* prepared,
+                                bool projected, double* work, double* dense) {
+    HessianBlocks<R> blocks(v, work);
     double natural[3][max_rows], z[nz], e[ne];
-    gather(v, u, natural);
-    bool any = false;
-    int filled = 0;
-    const auto flush = [&] {
-      int block = 0;
-      for (int a = 0; a < 3; ++a)
-        for (int b = a; b < 3; ++b, ++block)
-          multiply_add(g, t + static_cast<std::size_t>(block) * kHessianRows * n8, filled, n8, a == b,
-                       blocks + static_cast<std::size_t>(block) * n8 * n8);
-      filled = 0;
-    };
+    gather<R>(v, u, natural);
     for (int q = 0; q < v.num_points; ++q) {
       point(v, natural, q, z);
       Kin::strain(z, e);
@@ -158,10 +135,6 @@ struct PointKernel {
         for (int k = 0; k < ne; ++k) zero = zero && sigma[c].d[k] == 0;
       }
       if (zero) continue;
-      if (!any) {
-        std::memset(blocks, 0, sizeof(double) * 6 * static_cast<std::size_t>(n8) * n8);
-        any = true;
-      }
       Kin::strain_gradient(z, b);
       for (int c = 0; c < ne; ++c)
         for (int i = 0; i < nz; ++i) {
@@ -184,41 +157,12 @@ struct PointKernel {
       for (int j = 0; j < nz; ++j) {
         double column[nz], mapped[nz];
         for (int i = 0; i < nz; ++i) column[i] = half[i][j];
-        Kin::from_point(column, ji, 1, mapped);
+        Kin::from_point(column, ji, 1.0, mapped);
         for (int i = 0; i < nz; ++i) folded[i][j] = mapped[i];
       }
-      const double* table = v.node_by_row + static_cast<std::size_t>(q) * R * n8;
-      std::memcpy(g + static_cast<std::size_t>(filled) * n8, table,
-                  sizeof(double) * R * static_cast<std::size_t>(n8));
-      int block = 0;
-      for (int ca = 0; ca < 3; ++ca)
-        for (int cb = ca; cb < 3; ++cb, ++block)
-          for (int r = 0; r < R; ++r) {
-            double* row = t + (static_cast<std::size_t>(block) * kHessianRows + filled + r) * n8;
-            for (int j = 0; j < n8; ++j) {
-              double sum = 0;
-              for (int sn = 0; sn < R; ++sn) sum += folded[ca * R + r][cb * R + sn] * table[sn * n8 + j];
-              row[j] = sum;
-            }
-          }
-      filled += R;
-      if (filled == kHessianRows) flush();
+      blocks.add(q, &folded[0][0], 1);
     }
-    if (!any) return false;
-    if (filled) flush();
-    const int n3 = 3 * n;
-    int block = 0;
-    for (int a = 0; a < 3; ++a)
-      for (int b = a; b < 3; ++b, ++block) {
-        const double* k = blocks + static_cast<std::size_t>(block) * n8 * n8;
-        for (int i = 0; i < n; ++i)
-          for (int j = a == b ? i : 0; j < n; ++j) {
-            const double value = k[static_cast<std::size_t>(i) * n8 + j];
-            dense[static_cast<std::size_t>(3 * i + a) * n3 + 3 * j + b] = value;
-            dense[static_cast<std::size_t>(3 * j + b) * n3 + 3 * i + a] = value;
-          }
-      }
-    return true;
+    return blocks.finish(dense);
   }
 
   /// New history [nq][ns].
@@ -226,7 +170,7 @@ struct PointKernel {
                      double* s_new) {
     if constexpr (ns > 0) {
       double natural[3][max_rows], z[nz], e[ne];
-      gather(v, u, natural);
+      gather<R>(v, u, natural);
       for (int q = 0; q < v.num_points; ++q) {
         point(v, natural, q, z);
         Kin::strain(z, e);
@@ -241,7 +185,7 @@ struct PointKernel {
   static void regime(const Law& law, const ElementView& v, const double* u, const double* prepared,
                      signed char* out) {
     double natural[3][max_rows], z[nz], e[ne];
-    gather(v, u, natural);
+    gather<R>(v, u, natural);
     for (int q = 0; q < v.num_points; ++q) {
       point(v, natural, q, z);
       Kin::strain(z, e);
@@ -284,8 +228,8 @@ struct PointKernel {
                       const double* s_old, const double* du, const double* du_old, const double* ds_old,
                       const double* dtheta, double* df, double* ds_new) {
     double natural[3][max_rows], natural_old[3][max_rows];
-    gather(v, u, natural);
-    gather(v, u_old, natural_old);
+    gather<R>(v, u, natural);
+    gather<R>(v, u_old, natural_old);
     for (int q = 0; q < v.num_points; ++q) {
       Directions e[ne], e_old[ne], s[at_least_one(ns)], th[nt], prepared[at_least_one(np)];
       seed_strain(v, natural_old, du_old, q, e_old);
@@ -336,7 +280,7 @@ struct PointKernel {
                              const double* s_bar, double* u_bar) {
     if constexpr (ns > 0) {
       double natural[3][max_rows], out[3][max_rows];
-      gather(v, u, natural);
+      gather<R>(v, u, natural);
       for (int q = 0; q < v.num_points; ++q) {
         double z[nz], e[ne], b[ne][nz], p[nz];
         point(v, natural, q, z);
@@ -357,7 +301,7 @@ struct PointKernel {
           p[i] /= v.weight[q];  // put_point multiplies by the weight; this sum has none
         put_point(v, p, q, out);
       }
-      scatter(v, out, u_bar);
+      scatter<R>(v, out, u_bar);
     }
   }
 
@@ -368,9 +312,9 @@ struct PointKernel {
                            const double* s_bar, double* u_old_bar, double* s_old_bar, double* theta_bar) {
     constexpr int nd = np + nt, no = ne + ns + nt;
     double natural[3][max_rows], natural_old[3][max_rows], natural_adj[3][max_rows], out[3][max_rows];
-    gather(v, u, natural);
-    gather(v, adj, natural_adj);
-    if constexpr (np > 0) gather(v, u_old, natural_old);
+    gather<R>(v, u, natural);
+    gather<R>(v, adj, natural_adj);
+    if constexpr (np > 0) gather<R>(v, u_old, natural_old);
     for (int q = 0; q < v.num_points; ++q) {
       double z[nz], e[ne], b[ne][nz], dz[nz], de[ne];
       point(v, natural, q, z);
@@ -426,7 +370,7 @@ struct PointKernel {
         for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] += bar[ne + ns + c];
       }
     }
-    if constexpr (np > 0) scatter(v, out, u_old_bar);
+    if constexpr (np > 0) scatter<R>(v, out, u_old_bar);
   }
 };
 

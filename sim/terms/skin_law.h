@@ -17,13 +17,10 @@
 
 #include "sim/math/sym3.h"
 #include "sim/terms/damper.h"
+#include "sim/terms/skin_response.h"
 
 namespace rhytid {
 inline namespace RHYTID_ISA {
-
-struct SkinTheta {
-  static constexpr int mu_inf = 0, stiffening = 1, bulk = 2, mu_m = 3, tau = 4;
-};
 
 /// C̄ − I from Y = C − I, C̄ = J^(−2/3) C.
 template <class T>
@@ -137,6 +134,20 @@ struct SkinLaw {
     return psi;
   }
 
+  /// The same in closed form with the tangent (packed_kernel.h); the constant is the damper's weight.
+  static constexpr int num_constants = 1;
+  void constants(const double* theta, double dt, double* c) const {
+    c[0] = damper(scheme, theta[SkinTheta::tau], dt).weight;
+  }
+  template <class V>
+  V response(const V* y, const V* prepared, const V* theta, const V* constants, V* sigma,
+             V (*tangent)[6]) const {
+    clear_response(sigma, tangent);
+    const V k = constants[0] * theta[SkinTheta::mu_m];
+    const V equilibrium_energy = equilibrium_response(y, theta, volume, sigma, tangent);
+    return equilibrium_energy + maxwell_response(y, prepared, k, sigma, tangent);
+  }
+
   template <class T>
   void update(const T* y, const T* prepared, const T* theta, const double*, double dt, T* history) const {
     T ybar[6];
@@ -162,6 +173,14 @@ struct ElasticSkinLaw {
     stress_from(a, y, sigma);
     return psi;
   }
+  static constexpr int num_constants = 0;
+  void constants(const double*, double, double*) const {}
+  template <class V>
+  V response(const V* y, const V*, const V* theta, const V*, V* sigma, V (*tangent)[6]) const {
+    clear_response(sigma, tangent);
+    return equilibrium_response(y, theta, volume, sigma, tangent);
+  }
+
   template <class T>
   void update(const T*, const T*, const T*, const double*, double, T*) const {}
 };

@@ -1,0 +1,76 @@
+// Eigenvalues, eigenvectors and divided differences of symmetric 3×3 matrices for a double or a pack of them.
+//
+//   eigen_sym3_packed   cyclic Jacobi without branches; lanes that have converged are rotated by exact
+//   identities log_difference      (ln a − ln b)/(a − b) = 2 atanh(z)/z / (a + b), z = (a − b)/(a + b);
+//   smooth through a = b
+//
+// Source   DESIGN section 2. Storage of matrices as in sym3.h. Units dimensionless.
+// Tests    tests/sim/math/spectral3_test.cpp
+#pragma once
+
+#include "sim/math/lanes.h"
+#include "sim/math/sym3.h"
+
+namespace rhytid {
+inline namespace RHYTID_ISA {
+
+/// As eigen_sym3, for V = double or Lanes.
+template <class V>
+void eigen_sym3_packed(const V* a, V* eigenvalues, V (*q)[3]) {
+  V m[3] = {a[0], a[1], a[2]}, off[3] = {a[5], a[4], a[3]};  // off[k]: the entry that does not touch k
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) q[i][j] = broadcast<V>(i == j);
+  constexpr int kSweeps = 12;  // 5 suffice for ordinary matrices; graded ones take a few more
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    const V rest = off[0] * off[0] + off[1] * off[1] + off[2] * off[2];
+    const V diagonal = m[0] * m[0] + m[1] * m[1] + m[2] * m[2];
+    if (!any_of(rest > 1e-34 * diagonal)) break;  // also leaves on NaN
+    for (int k = 2; k >= 0; --k) {
+      const int p = k == 0 ? 1 : 0, r = k == 2 ? 1 : 2;
+      // t = tan of the rotation: the smaller root of t² + 2θt − 1, θ = d/(2 m_pr), without the quotient.
+      const V d = m[r] - m[p], twice = off[k] + off[k];
+      const V root = lane_sqrt(d * d + twice * twice);
+      const V denominator = d + select(d < 0, -root, root);
+      const V t = select(denominator != 0, twice / denominator, broadcast<V>(0));
+      const V c = 1.0 / lane_sqrt(t * t + 1.0), s = t * c, shift = t * off[k];
+      m[p] -= shift;
+      m[r] += shift;
+      off[k] = broadcast<V>(0);
+      // m_kp is the entry that touches neither r: off[r]; m_kr is off[p].
+      const V kp = off[r], kr = off[p];
+      off[r] = c * kp - s * kr;
+      off[p] = s * kp + c * kr;
+      for (int i = 0; i < 3; ++i) {
+        const V qp = q[i][p], qr = q[i][r];
+        q[i][p] = c * qp - s * qr;
+        q[i][r] = s * qp + c * qr;
+      }
+    }
+  }
+  for (int i = 0; i < 3; ++i) eigenvalues[i] = m[i];
+}
+
+/// As cholesky_one_plus.
+template <class V>
+void cholesky_one_plus_packed(const V* y, V* l) {
+  l[0] = lane_sqrt(y[0] + 1.0);
+  const V r0 = 1.0 / l[0];
+  l[3] = y[3] * r0;
+  l[4] = y[4] * r0;
+  l[1] = lane_sqrt(y[1] + 1.0 - l[3] * l[3]);
+  l[5] = (y[5] - l[4] * l[3]) / l[1];
+  l[2] = lane_sqrt(y[2] + 1.0 - l[4] * l[4] - l[5] * l[5]);
+}
+
+/// (ln a − ln b)/(a − b) for a, b > 0, given also their logarithms.
+template <class V>
+V log_difference(const V& a, const V& b, const V& log_a, const V& log_b) {
+  const V sum = a + b, difference = a - b, z = difference / sum, s = z * z;
+  // 2 atanh(z)/z = 2 (1 + s/3 + s²/5 + ...); the first term left out is s¹⁰/21, 5e-19 at the switch.
+  V series = broadcast<V>(1. / 19);
+  for (int k = 17; k >= 1; k -= 2) series = series * s + 1. / k;
+  return select(s < 0.016, 2.0 * series / sum, (log_a - log_b) / difference);
+}
+
+}  // namespace RHYTID_ISA
+}  // namespace rhytid

@@ -1,0 +1,148 @@
+// Stress and tangent of skin in closed form, for V = double or a pack of points: what the element kernels
+// run. The same law as skin_law.h, whose dual numbers are the reference that the tests compare this with.
+//
+// A spring sees the eigenvalues c_i = 1 + y_i of some symmetric matrix with eigenvectors q_i. With Kirchhoff
+// principal stresses t_i = f ē_i + p (ē_i the deviator of ½ ln c_i) and T_ij = ∂t_i/∂(½ ln c_j):
+//
+//   S_i = t_i/c_i          σ = ½ Σ S_i q_i q_iᵀ                    (σ = ∂ψ/∂Y; off-diagonals count both
+//   halves) ∂S_i/∂c_j = ½ T_ij/(c_i c_j) − δ_ij t_i/c_i² (S_i − S_j)/(c_i − c_j) = ¼ f [ln c_i, ln c_j]
+//   (1/c_i + 1/c_j) − ½ (t_i + t_j)/(c_i c_j)
+//
+// and the tangent is ½ Rᵀ diag-block(∂S/∂c, 2 (S_i − S_j)/(c_i − c_j)) R, R the change of Y to Qᵀ dY Q. The
+// Maxwell spring is the same on X = M C Mᵀ with q̃ = Mᵀ q for q, M = L⁻¹, Ĉ^v = L Lᵀ.
+//
+// Source   DESIGN section 2; Daleckii-Krein; Units and shapes as in skin_law.h; tangent [6][6] = ∂σ/∂Y.
+// Smooth   divided differences without difference quotients where eigenvalues meet.
+// Tests    tests/sim/terms/skin_response_test.cpp
+#pragma once
+
+#include "sim/math/spectral3.h"
+
+namespace rhytid {
+inline namespace RHYTID_ISA {
+
+struct SkinTheta {
+  static constexpr int mu_inf = 0, stiffening = 1, bulk = 2, mu_m = 3, tau = 4;
+};
+
+/// Eigenvalues' logarithmic strains of a spring and what follows from them.
+template <class V>
+struct SpringState {
+  V vectors[3][3];   ///< columns q_i, or q̃_i
+  V c[3], log_c[3];  ///< c_i, ln c_i
+  V deviator[3], q;  ///< ē_i and Σ ē_i²
+};
+
+template <class V>
+void spring_state(const V* y, SpringState<V>& s) {
+  V e[3];
+  eigen_sym3_packed(y, e, s.vectors);
+  for (int i = 0; i < 3; ++i) {
+    s.c[i] = e[i] + 1.0;
+    s.log_c[i] = map_lanes([](double x) { return std::log1p(x); }, e[i]);
+  }
+  const V mean = (s.log_c[0] + s.log_c[1] + s.log_c[2]) * (1. / 3);
+  for (int i = 0; i < 3; ++i) s.deviator[i] = 0.5 * (s.log_c[i] - mean);
+  s.q = s.deviator[0] * s.deviator[0] + s.deviator[1] * s.deviator[1] + s.deviator[2] * s.deviator[2];
+}
+
+/// Adds a spring's σ, and its tangent unless null: t_i = f ē_i + p, T_ij = f (δ_ij − 1/3) + g ē_i ē_j + h.
+template <class V>
+void add_spring(const SpringState<V>& s, const V& f, const V& p, const V& g, const V& h, V* sigma,
+                V (*tangent)[6]) {
+  V r[6][6];  // (Q^T dY Q)_a = Σ_e r[a][e] dY_e
+  const int pairs = tangent ? 6 : 3;
+  for (int a = 0; a < pairs; ++a) {
+    const int i = kSymRow[a], j = kSymCol[a];
+    for (int e = 0; e < 6; ++e) {
+      const int k = kSymRow[e], l = kSymCol[e];
+      r[a][e] = s.vectors[k][i] * s.vectors[l][j];
+      if (e >= 3) r[a][e] += s.vectors[l][i] * s.vectors[k][j];
+    }
+  }
+  V t[3], inverse[3];
+  for (int i = 0; i < 3; ++i) {
+    t[i] = f * s.deviator[i] + p;
+    inverse[i] = 1.0 / s.c[i];
+    const V half = 0.5 * t[i] * inverse[i];
+    for (int e = 0; e < 6; ++e) sigma[e] += half * r[i][e];
+  }
+  if (!tangent) return;
+  V z[6][6];  // ½ block · R
+  for (int i = 0; i < 3; ++i) {
+    V row[3];
+    for (int j = 0; j < 3; ++j) {
+      V big = g * s.deviator[i] * s.deviator[j] + h - f * (1. / 3);
+      if (i == j) big += f;
+      row[j] = 0.25 * big * inverse[i] * inverse[j];
+      if (i == j) row[j] -= 0.5 * t[i] * inverse[i] * inverse[i];
+    }
+    for (int e = 0; e < 6; ++e) z[i][e] = row[0] * r[0][e] + row[1] * r[1][e] + row[2] * r[2][e];
+  }
+  for (int a = 3; a < 6; ++a) {
+    const int i = kSymRow[a], j = kSymCol[a];
+    const V log_slope = log_difference(s.c[i], s.c[j], s.log_c[i], s.log_c[j]);
+    const V shear =
+        0.25 * f * log_slope * (inverse[i] + inverse[j]) - 0.5 * (t[i] + t[j]) * inverse[i] * inverse[j];
+    for (int e = 0; e < 6; ++e) z[a][e] = shear * r[a][e];
+  }
+  for (int d = 0; d < 6; ++d)
+    for (int e = d; e < 6; ++e) {
+      V sum = tangent[d][e];
+      for (int a = 0; a < 6; ++a) sum += r[a][d] * z[a][e];
+      tangent[d][e] = tangent[e][d] = sum;
+    }
+}
+
+/// The equilibrium part: energy; `volume` scales K; adds σ and, unless null, the tangent.
+template <class V>
+V equilibrium_response(const V* y, const V* theta, double volume, V* sigma, V (*tangent)[6]) {
+  SpringState<V> s;
+  spring_state(y, s);
+  const V &mu = theta[SkinTheta::mu_inf], &stiffening = theta[SkinTheta::stiffening];
+  const V bulk = volume * theta[SkinTheta::bulk];
+  const V z = stiffening * s.q, grown = map_lanes([](double x) { return std::expm1(x); }, z);
+  const V f = 2.0 * mu * (grown + 1.0);
+  const V det = det_minus_one(y), j = lane_sqrt(det + 1.0), jm1 = det / (j + 1.0);
+  add_spring(s, f, bulk * jm1 * j, 2.0 * f * stiffening, bulk * j * (jm1 + j), sigma, tangent);
+  // (e^z − 1)/C → q as C → 0
+  const V fung = select(stiffening > 1e-12, grown / stiffening, s.q * (1.0 + 0.5 * z));
+  return mu * fung + 0.5 * bulk * jm1 * jm1;
+}
+
+/// The Maxwell spring of stiffness k = w μ_m between Y = C − I and the history Ĉ^v − I: energy, σ and tangent
+/// added.
+template <class V>
+V maxwell_response(const V* y, const V* prepared, const V& k, V* sigma, V (*tangent)[6]) {
+  V l[6], m[6], difference[6], x[6];
+  cholesky_one_plus_packed(prepared, l);
+  invert_lower(l, m);
+  for (int c = 0; c < 6; ++c) difference[c] = y[c] - prepared[c];
+  congruence_lower(m, difference, x);
+  SpringState<V> s;
+  spring_state(x, s);
+  for (int i = 0; i < 3; ++i) {  // q̃ = Mᵀ q
+    V* const v0 = &s.vectors[0][i];
+    V* const v1 = &s.vectors[1][i];
+    V* const v2 = &s.vectors[2][i];
+    *v0 = m[0] * *v0 + m[3] * *v1 + m[4] * *v2;
+    *v1 = m[1] * *v1 + m[5] * *v2;
+    *v2 = m[2] * *v2;
+  }
+  const V zero = broadcast<V>(0);
+  add_spring(s, 2.0 * k, zero, zero, zero, sigma, tangent);
+  return k * s.q;
+}
+
+/// Zeroes what the responses above add to.
+template <class V>
+void clear_response(V* sigma, V (*tangent)[6]) {
+  for (int c = 0; c < 6; ++c) {
+    sigma[c] = broadcast<V>(0);
+    if (tangent)
+      for (int d = 0; d < 6; ++d) tangent[c][d] = broadcast<V>(0);
+  }
+}
+
+}  // namespace RHYTID_ISA
+}  // namespace rhytid

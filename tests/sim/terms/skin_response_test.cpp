@@ -1,0 +1,166 @@
+// The closed-form response of skin against the same law through dual numbers: random states and the ones that
+// hurt (repeated eigenvalues, nearly repeated, tiny and large strains), one point and packs.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include "law_cases.h"
+#include "sim/math/spectral3.h"
+
+namespace rhytid::test {
+namespace {
+
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Tangent = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
+VectorXd strain_of(const Vec3& stretches, Rng& rng) {
+  const Mat3 q = Eigen::Quaterniond(uniform(rng, 4).normalized().data()).toRotationMatrix();
+  // Y from stretches − 1, so that tiny strains keep their digits.
+  const Vec3 e = stretches.array() - 1;
+  const Mat3 y = q * Mat3((2 * e.array() + e.array().square()).matrix().asDiagonal()) * q.transpose();
+  VectorXd v(6);
+  for (int c = 0; c < 6; ++c) v[c] = y(kSymRow[c], kSymCol[c]);
+  return v;
+}
+
+struct Point {
+  VectorXd y, history, theta;
+};
+
+std::vector<Point> points() {
+  Rng rng(31);
+  std::vector<Vec3> stretches = {{1, 1, 1},
+                                 {1.2, 1.2, 0.9},
+                                 {1.3, 1.3, 1.3},
+                                 {1.1, 1.1 + 1e-9, 0.8},
+                                 {1.1, 1.1, 1.1 + 1e-13},
+                                 {0.9, 1.2, 1.2 + 1e-6},
+                                 {2.4, 0.5, 0.9},
+                                 {0.4, 0.4, 2.2},
+                                 {1.13, 1, 0.9}};
+  for (double tiny : {1e-4, 1e-8, 1e-13}) stretches.push_back(Vec3(1 + tiny, 1 - 0.3 * tiny, 1 + 0.2 * tiny));
+  std::vector<Point> all;
+  for (const Vec3& s : stretches)
+    for (const Vec3& h : {Vec3(1, 1, 1), Vec3(1.1, 1, 1 / 1.1), Vec3(0.9, 0.9, 1 / 0.81)})
+      for (double stiffening : {1.0, 0.0, 6.0}) {
+        Point p;
+        p.y = strain_of(s, rng);
+        p.history = strain_of(h, rng);
+        p.theta = VectorXd(5);
+        p.theta << 0.2, stiffening, 17, 0.8, 1. / 12;
+        all.push_back(p);
+      }
+  for (int i = 0; i < 200; ++i) {
+    Point p;
+    p.y = random_strain(rng, 0.25);
+    p.history = random_strain(rng, 0.15);
+    p.theta = VectorXd(5);
+    p.theta << 0.2, 1.5, 33, 0.8, 0.03;
+    all.push_back(p);
+  }
+  return all;
+}
+
+constexpr double kDt = 1. / 24;
+
+template <class Law>
+double by_duals(const Law& law, const Point& p, Vec6& sigma, Tangent& tangent) {
+  Dual<6> y[6], history[6], theta[5], s[6];
+  for (int c = 0; c < 6; ++c) y[c] = Dual<6>::variable(p.y[c], c), history[c] = p.history[c];
+  for (int c = 0; c < 5; ++c) theta[c] = p.theta[c];
+  const Dual<6> psi = law.template stress<Dual<6>>(y, history, theta, nullptr, kDt, s);
+  for (int c = 0; c < 6; ++c) {
+    sigma[c] = s[c].v;
+    for (int d = 0; d < 6; ++d) tangent(c, d) = s[c].d[d];
+  }
+  return psi.v;
+}
+
+template <class Law>
+double in_closed_form(const Law& law, const Point& p, Vec6& sigma, Tangent& tangent) {
+  double constants[1], d[6][6];
+  law.constants(p.theta.data(), kDt, constants);
+  const double psi =
+      law.template response<double>(p.y.data(), p.history.data(), p.theta.data(), constants, sigma.data(), d);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) tangent(i, j) = d[i][j];
+  return psi;
+}
+
+template <class Law>
+void compare(const Law& law) {
+  for (const Point& p : points()) {
+    Vec6 sigma, reference;
+    Tangent tangent, wanted;
+    const double psi = in_closed_form(law, p, sigma, tangent), energy = by_duals(law, p, reference, wanted);
+    SCOPED_TRACE(testing::Message() << "Y = " << p.y.transpose() << ", history " << p.history.transpose());
+    // The natural scale of stress is stiffness times strain: where strains cancel, their rounding stays.
+    const double strain = std::max(p.y.norm(), p.history.norm());
+    EXPECT_NEAR(psi, energy, 2e-14 * wanted.norm() * strain * strain);
+    EXPECT_LE((sigma - reference).norm(), 1e-14 * wanted.norm() * strain + 1e-300);
+    EXPECT_LE((tangent - wanted).norm(), 3e-14 * wanted.norm());
+    EXPECT_EQ((tangent - tangent.transpose()).norm(), 0);
+  }
+}
+
+TEST(SkinResponse, ViscoelasticClosedFormIsTheLaw) {
+  compare(SkinLaw{});
+}
+TEST(SkinResponse, ElasticClosedFormIsTheLaw) {
+  compare(ElasticSkinLaw{});
+}
+
+TEST(SkinResponse, PackIsLaneByLaneTheSingle) {
+  const std::vector<Point> all = points();
+  const SkinLaw law;
+  for (std::size_t first = 0; first + kLanes <= all.size(); first += kLanes) {
+    Lanes y[6], history[6], theta[5], constants[1], sigma[6], tangent[6][6];
+    for (int k = 0; k < kLanes; ++k) {
+      const Point& p = all[first + k];
+      double c;
+      law.constants(p.theta.data(), kDt, &c);
+      constants[0][k] = c;
+      for (int i = 0; i < 6; ++i) y[i][k] = p.y[i], history[i][k] = p.history[i];
+      for (int i = 0; i < 5; ++i) theta[i][k] = p.theta[i];
+    }
+    const Lanes psi = law.response<Lanes>(y, history, theta, constants, sigma, tangent);
+    for (int k = 0; k < kLanes; ++k) {
+      Vec6 s;
+      Tangent t;
+      const double single = in_closed_form(law, all[first + k], s, t);
+      EXPECT_NEAR(psi[k], single, 1e-14 * std::abs(single));
+      for (int i = 0; i < 6; ++i) {
+        EXPECT_NEAR(sigma[i][k], s[i], 1e-14 * t.norm());
+        for (int j = 0; j < 6; ++j) EXPECT_NEAR(tangent[i][j][k], t(i, j), 1e-13 * t.norm());
+      }
+    }
+  }
+}
+
+TEST(Spectral3, JacobiReproducesTheMatrix) {
+  for (const Point& p : points()) {
+    double e[3], q[3][3];
+    eigen_sym3_packed(p.y.data(), e, q);
+    for (int c = 0; c < 6; ++c) {
+      const int i = kSymRow[c], j = kSymCol[c];
+      double sum = 0, dot = 0;
+      for (int k = 0; k < 3; ++k) sum += e[k] * q[i][k] * q[j][k], dot += q[k][i] * q[k][j];
+      EXPECT_NEAR(sum, p.y[c], 4e-15 * p.y.norm());
+      EXPECT_NEAR(dot, i == j, 4e-15);
+    }
+  }
+}
+
+TEST(Spectral3, LogDifferenceIsSmoothWhereItsArgumentsMeet) {
+  for (double a : {0.1, 1.0, 7.0})
+    for (double gap : {0.0, 1e-15, 1e-9, 1e-3, 0.1, 0.28, 0.29, 0.6, 3.0}) {
+      const double b = a * (1 + gap);
+      const double exact = b == a ? 1 / a
+                                  : static_cast<double>(std::log1p((static_cast<long double>(b) - a) / a) /
+                                                        (static_cast<long double>(b) - a));
+      EXPECT_NEAR(log_difference(a, b, std::log(a), std::log(b)), exact, 3e-15 * exact) << a << " " << gap;
+    }
+}
+
+}  // namespace
+}  // namespace rhytid::test
