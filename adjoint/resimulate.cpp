@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "sim/time/step_passes.h"
+
 namespace rhytid::adjoint {
 
 Trajectory resimulate(const Model& model, const VectorXd& native, const Trajectory& reference,
@@ -12,29 +14,30 @@ Trajectory resimulate(const Model& model, const VectorXd& native, const Trajecto
   run.initial = reference.initial;
   State current = run.initial;
   if (!reference.steps.empty()) current.time = reference.steps.front().step.t_old;
-  BlockMatrix matrix(model.pattern());
-  CholeskyFactor factor(model.pattern());
+  const auto passes = [&](const StepRecord& known) {
+    return 1 + static_cast<int>(known.earlier_passes.size());
+  };
+  StepSolver solver(model, native, options, reference.steps.empty() ? 1 : passes(reference.steps.front()));
   for (int i = 0; i < static_cast<int>(reference.steps.size()); ++i) {
     const StepRecord& known = reference.steps[i];
-    StepProblem problem(model, native, known.step, current);
-    VectorXd q;
     MinimiserReport report;
     if (guess) {
-      q = model.to_unknowns(guess(i, current));
-      report = minimise(problem, q, options, factor, matrix);
+      const VectorXd from = guess(i, current);
+      report = solver.solve(known.step, current, &from);
     }
-    if (!report.converged()) report = solve_step(problem, current, options, factor, matrix, q);
+    if (!report.converged()) report = solver.solve(known.step, current);
     if (!report.converged()) {
       run.failure = "step " + std::to_string(i) + ": " + name(report.status) + " after " +
                     std::to_string(report.iterations) + " iterations";
       break;
     }
-    State next = problem.advance(model.to_displacement(q));
-    if (observer && !observer(i, problem, next)) {
+    State next = solver.problem().advance(solver.displacement());
+    if (observer && !observer(i, solver.problem(), next)) {
       run.failure = "stopped";
       break;
     }
     StepRecord record{known.step, known.frame, known.bisections, known.softened, next, std::move(report)};
+    record.earlier_passes = solver.earlier_passes();
     if (!keep_history) record.state.history.resize(0);
     current = std::move(next);
     run.steps.push_back(std::move(record));

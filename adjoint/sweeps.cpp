@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "sim/core/error.h"
+#include "sim/time/step_passes.h"
 
 namespace rhytid::adjoint {
 
@@ -27,24 +28,105 @@ void check_run(const Trajectory& run) {
   }
 }
 
-/// Factors the raw Hessian of a step at its converged state.
-void factor_step(StepProblem& problem, const StepRecord& record, BlockMatrix& matrix, CholeskyFactor& factor,
-                 SweepReport& report, VectorXd* residual) {
-  const VectorXd q = problem.model().to_unknowns(record.state.u);
-  VectorXd r;
-  if (!std::isfinite(problem.energy(q, &r)))
+/// Factors the raw Hessian of a pass over a step where it ended, u; returns the residual there.
+VectorXd factor_at(StepProblem& problem, const VectorXd& u, const StepRecord& record, BlockMatrix& matrix,
+                   CholeskyFactor& factor) {
+  const VectorXd q = problem.model().to_unknowns(u);
+  VectorXd residual;
+  if (!std::isfinite(problem.energy(q, &residual)))
     throw GradientError(where(record) + "its state lies outside the domain for these parameters");
   problem.hessian(q, Curvature::raw, matrix);
   if (!factor.factorize(matrix))
     throw GradientError(where(record) + "the Hessian at the converged state is not positive definite");
+  return residual;
+}
+
+/// The same for the end of a step, with its entries of the report.
+void factor_step(StepProblem& problem, const StepRecord& record, BlockMatrix& matrix, CholeskyFactor& factor,
+                 SweepReport& report, VectorXd* residual) {
+  const VectorXd r = factor_at(problem, record.state.u, record, matrix, factor);
   report.smallest_pivot.push_back(factor.smallest_pivot());
   report.largest_pivot.push_back(factor.largest_pivot());
   report.residual.push_back(r.norm());
   if (residual) *residual = r;
 }
 
+bool lags(const Term& term) {
+  return term.kernels().history_is_lag;
+}
+
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+struct TangentPair {
+  Block du, ds;
+};
+
+/// Derivatives of a pass's end from those of its start, for one chunk of directions; the factor is that of
+/// the pass. `only_lag`: of the history only what lags is advanced, the rest stays as at the start.
+TangentPair advance_tangent(const StepProblem& problem, const VectorXd& u, const CholeskyFactor& factor,
+                            const std::vector<const VectorXd*>& dnative, const Block& du, const Block& ds,
+                            bool only_lag) {
+  const Model& model = problem.model();
+  const VectorXd &u_old = problem.old().u, &s_old = problem.old().history;
+  Term::Directions dir;
+  dir.count = static_cast<int>(dnative.size());
+  dir.du_old = du.data();
+  dir.dnative = dnative;
+  Block dr = Block::Zero(du.rows(), D);
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const std::size_t at = model.history_offset(t);
+    dir.ds_old = ds.data() + at * D;
+    model.terms[t].tangent(problem.step(), problem.data(t), u, u_old, s_old.data() + at, dir, dr.data(),
+                           nullptr);
+  }
+  const MatrixXd dq = factor.solve(-model.to_unknowns(MatrixXd(dr.leftCols(dir.count))));
+  TangentPair next{Block::Zero(du.rows(), D), only_lag ? ds : Block::Zero(ds.rows(), D)};
+  next.du.leftCols(dir.count) = model.to_displacement(dq);
+  dir.du = next.du.data();
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    if (only_lag && !lags(model.terms[t])) continue;
+    const std::size_t at = model.history_offset(t);
+    dir.ds_old = ds.data() + at * D;
+    model.terms[t].tangent(problem.step(), problem.data(t), u, u_old, s_old.data() + at, dir, nullptr,
+                           next.ds.data() + at * D);
+  }
+  return next;
+}
+
+/// Adjoint of a pass: from s_bar, the derivative by what it leaves, and its right-hand side adds to u_old_bar
+/// and native_bar and returns the derivative by the history at its start; adj_q is the solution.
+VectorXd retreat_adjoint(const StepProblem& problem, const VectorXd& u, const CholeskyFactor& factor,
+                         VectorXd rhs, const VectorXd& s_bar, VectorXd& u_old_bar, VectorXd& native_bar,
+                         VectorXd& adj_q) {
+  const Model& model = problem.model();
+  for (std::size_t t = 0; t < model.terms.size(); ++t)
+    model.terms[t].adjoint_update(problem.step(), problem.data(t), u, s_bar.data() + model.history_offset(t),
+                                  rhs);
+  adj_q = factor.solve(model.to_unknowns(rhs)).col(0);
+  const VectorXd adj = model.to_displacement(adj_q);
+  VectorXd s_old_bar = VectorXd::Zero(s_bar.size());
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    const std::size_t at = model.history_offset(t);
+    model.terms[t].adjoint_step(problem.step(), problem.data(t), u, problem.old().u,
+                                problem.old().history.data() + at, adj, s_bar.data() + at, u_old_bar,
+                                s_old_bar.data() + at, native_bar);
+  }
+  return s_old_bar;
+}
+
+/// Splits a history into what lags (returned; zero elsewhere) and the rest (kept; zero where it lags).
+VectorXd take_lag(const Model& model, VectorXd& history) {
+  VectorXd lag = VectorXd::Zero(history.size());
+  for (std::size_t t = 0; t < model.terms.size(); ++t) {
+    if (!lags(model.terms[t])) continue;
+    const auto at = static_cast<Eigen::Index>(model.history_offset(t)),
+               size = static_cast<Eigen::Index>(model.terms[t].history_size());
+    lag.segment(at, size) = history.segment(at, size);
+    history.segment(at, size).setZero();
+  }
+  return lag;
 }
 
 }  // namespace
@@ -71,6 +153,11 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
   };
   const bool starts_at_rest = run.frame_end.front() == 0;  // else a settling step leads to frame 0
   if (starts_at_rest) record_frame(0, run.initial);
+  const auto directions_of = [&](int chunk) {
+    std::vector<const VectorXd*> list;
+    for (int k = chunk * D; k < std::min(count, chunk * D + D); ++k) list.push_back(&columns[k]);
+    return list;
+  };
 
   BlockMatrix matrix(model.pattern());
   CholeskyFactor factor(model.pattern());
@@ -78,31 +165,21 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
   for (int i = 0; i < static_cast<int>(run.steps.size()); ++i) {
     const StepRecord& record = run.steps[i];
     const State& old = run.before(i);
-    StepProblem problem(model, native, record.step, old);
-    factor_step(problem, record, matrix, factor, result.report, nullptr);
+    StepPasses passes(model, native, record.step, old, record.earlier_passes);
+    // Every pass is a step of its own from the same state but for the lag, which it hands to the next.
+    for (int j = 0; j + 1 < passes.count(); ++j) {
+      StepProblem& pass = passes.pass(j);
+      const VectorXd& u = record.earlier_passes[static_cast<std::size_t>(j)];
+      (void)factor_at(pass, u, record, matrix, factor);
+      for (int c = 0; c < chunks; ++c)
+        ds[c] = advance_tangent(pass, u, factor, directions_of(c), du[c], ds[c], true).ds;
+    }
+    factor_step(passes.last(), record, matrix, factor, result.report, nullptr);
     for (int c = 0; c < chunks; ++c) {
-      Term::Directions dir;
-      dir.count = std::min(D, count - c * D);
-      dir.du_old = du[c].data();
-      for (int k = 0; k < dir.count; ++k) dir.dnative.push_back(&columns[c * D + k]);
-      Block dr = Block::Zero(nu, D);
-      for (std::size_t t = 0; t < model.terms.size(); ++t) {
-        dir.ds_old = ds[c].data() + model.history_offset(t) * D;
-        model.terms[t].tangent(record.step, problem.data(t), record.state.u, old.u,
-                               old.history.data() + model.history_offset(t), dir, dr.data(), nullptr);
-      }
-      const MatrixXd dq = factor.solve(-model.to_unknowns(MatrixXd(dr.leftCols(dir.count))));
-      Block du_new = Block::Zero(nu, D), ds_new = Block::Zero(nh, D);
-      du_new.leftCols(dir.count) = model.to_displacement(dq);
-      dir.du = du_new.data();
-      for (std::size_t t = 0; t < model.terms.size(); ++t) {
-        dir.ds_old = ds[c].data() + model.history_offset(t) * D;
-        model.terms[t].tangent(record.step, problem.data(t), record.state.u, old.u,
-                               old.history.data() + model.history_offset(t), dir, nullptr,
-                               ds_new.data() + model.history_offset(t) * D);
-      }
-      du[c] = std::move(du_new);
-      ds[c] = std::move(ds_new);
+      TangentPair next =
+          advance_tangent(passes.last(), record.state.u, factor, directions_of(c), du[c], ds[c], false);
+      du[c] = std::move(next.du);
+      ds[c] = std::move(next.ds);
     }
     for (; frame <= run.frames() && run.frame_end[frame] == i + 1; ++frame) record_frame(frame, record.state);
   }
@@ -127,22 +204,20 @@ AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Tr
     const State& old = run.before(i);
     for (; frame >= 0 && run.frame_end[frame] == i + 1; --frame)
       if (output.size(frame) > 0) output.adjoint(frame, record.state, weights[frame], u_bar, s_bar);
-    StepProblem problem(model, native, record.step, old);
-    VectorXd residual;
-    factor_step(problem, record, matrix, factor, result.report, &residual);
-    VectorXd rhs = u_bar;
-    for (std::size_t t = 0; t < model.terms.size(); ++t)
-      model.terms[t].adjoint_update(record.step, problem.data(t), record.state.u,
-                                    s_bar.data() + model.history_offset(t), rhs);
-    const VectorXd adj_q = factor.solve(model.to_unknowns(rhs)).col(0);
+    StepPasses passes(model, native, record.step, old, record.earlier_passes);
+    VectorXd residual, adj_q, u_old_bar = VectorXd::Zero(nu);
+    factor_step(passes.last(), record, matrix, factor, result.report, &residual);
+    VectorXd s_old_bar = retreat_adjoint(passes.last(), record.state.u, factor, u_bar, s_bar, u_old_bar,
+                                         result.native_bar, adj_q);
     result.residual_error += adj_q.dot(residual);
-    const VectorXd adj = model.to_displacement(adj_q);
-    VectorXd u_old_bar = VectorXd::Zero(nu), s_old_bar = VectorXd::Zero(nh);
-    for (std::size_t t = 0; t < model.terms.size(); ++t) {
-      const std::size_t at = model.history_offset(t);
-      model.terms[t].adjoint_step(record.step, problem.data(t), record.state.u, old.u,
-                                  old.history.data() + at, adj, s_bar.data() + at, u_old_bar,
-                                  s_old_bar.data() + at, result.native_bar);
+    // Back through the earlier passes: each left the lag that the next started from, and nothing else.
+    for (int j = passes.count() - 2; j >= 0; --j) {
+      const VectorXd lag_bar = take_lag(model, s_old_bar);
+      const VectorXd& u = record.earlier_passes[static_cast<std::size_t>(j)];
+      const VectorXd left = factor_at(passes.pass(j), u, record, matrix, factor);
+      s_old_bar += retreat_adjoint(passes.pass(j), u, factor, VectorXd::Zero(nu), lag_bar, u_old_bar,
+                                   result.native_bar, adj_q);
+      result.residual_error += adj_q.dot(left);
     }
     u_bar = std::move(u_old_bar);
     s_bar = std::move(s_old_bar);

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "sim/core/error.h"
+#include "sim/time/step_passes.h"
 
 namespace rhytid::adjoint {
 
@@ -72,8 +73,8 @@ FunctionalDifference::FunctionalDifference(const SceneModel& scene_model, const 
   for (int f = 0; f <= run.frames(); ++f) values_.push_back(output.values(f, run.at_frame(f)));
   const VectorXd native = scene_model.native();
   for (int i = 0; i < static_cast<int>(run.steps.size()); ++i) {
-    const StepProblem problem(model(), native, run.steps[i].step, run.before(i));
-    regimes_.push_back(step_regimes(problem, run.steps[i].state.u));
+    StepPasses passes(model(), native, run.steps[i].step, run.before(i), run.steps[i].earlier_passes);
+    regimes_.push_back(step_regimes(passes.last(), run.steps[i].state.u));
   }
 }
 

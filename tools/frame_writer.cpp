@@ -8,6 +8,7 @@
 #include "sim/core/error.h"
 #include "sim/output/image.h"
 #include "sim/output/surface_files.h"
+#include "sim/scene/collider_motion.h"
 #include "sim/terms/term.h"
 
 namespace rhytid::tools {
@@ -45,12 +46,15 @@ std::vector<double> to_vector(const VectorXd& v) {
 std::vector<PictureSolid> collider_solids(const Scene& scene, double t) {
   std::vector<PictureSolid> solids;
   for (const ColliderScene& c : scene.colliders) {
-    if (c.shape != ShapeKind::sphere) continue;
-    std::vector<double> times;
-    for (const PathKnot& k : c.path) times.push_back(k.time);
-    const PathWeights w = path_weights(times, t);
-    const Vec3 centre = w.weight[0] * c.path[w.knot[0]].position + w.weight[1] * c.path[w.knot[1]].position;
-    solids.push_back(capsule_solid(centre, centre, c.radius));
+    if (c.shape == ShapeKind::plane) continue;
+    const BodyPose pose = ColliderMotion(c).at(t);
+    const Vec3 half =
+        pose.rotation * (c.shape == ShapeKind::capsule ? 0.5 * c.length : 0) * c.axis.normalized();
+    if (c.shape == ShapeKind::ellipsoid) {
+      solids.push_back(ellipsoid_solid(pose.centre, pose.rotation, c.semi_axes));
+    } else {
+      solids.push_back(capsule_solid(pose.centre - half, pose.centre + half, c.radius));
+    }
     solids.back().opacity = 0.25;  // the contact is what one wants to see
   }
   return solids;

@@ -7,6 +7,7 @@
 
 #include "sim/core/units.h"
 #include "sim/mesh/surface_edges.h"
+#include "sim/scene/collider_motion.h"
 #include "sim/surface/heat_map.h"
 #include "sim/terms/contact_law.h"
 
@@ -73,30 +74,22 @@ void review_collider(const SceneModel& scene_model, const ColliderScene& collide
   const SkinMesh& mesh = scene_model.model().mesh;
   const TimeScene& time = scene_model.scene().time;
   if (time.frames == 0) return;
-  std::vector<double> knots;
-  for (const PathKnot& k : collider.path) knots.push_back(k.time);
-  const auto centre = [&](double t) -> Vec3 {
-    const PathWeights w = path_weights(knots, t);
-    return w.weight[0] * collider.path[w.knot[0]].position + w.weight[1] * collider.path[w.knot[1]].position;
-  };
-  const Vec3 n = collider.normal.normalized();
-  const auto gap = [&](const Vec3& x, const Vec3& c) {
-    return collider.shape == ShapeKind::sphere ? (x - c).norm() - collider.radius : n.dot(x - c);
-  };
+  const ColliderMotion motion(collider);
+  const auto shape = collider_shape(collider);
   const std::string at = "collider " + collider.name;
   double rest_gap = std::numeric_limits<double>::infinity(), smallest = rest_gap, rim_distance = rest_gap;
   for (int frame = 0; frame <= time.frames; ++frame) {
-    const Vec3 c = centre(frame / time.frame_rate);
+    const BodyPose pose = motion.at(frame / time.frame_rate);
     double here = std::numeric_limits<double>::infinity();
     Vec3 touched = Vec3::Zero();
     for (int column = 0; column < mesh.num_columns; ++column) {
       const Vec3 x = mesh.rest.row(mesh.node(column, mesh.num_levels - 1)).transpose();
-      const double g = gap(x, c);
+      const double g = shape->evaluate(pose.to_body(x)).gap;
       if (g < here) here = g, touched = x;
     }
     if (frame == 0) rest_gap = here;
     smallest = std::min(smallest, here);
-    if (here > 0 || collider.shape != ShapeKind::sphere) continue;
+    if (here > 0 || collider.shape == ShapeKind::plane) continue;
     for (int column : mesh.rim_columns) {
       const Vec3 x = mesh.rest.row(mesh.node(column, mesh.num_levels - 1)).transpose();
       rim_distance = std::min(rim_distance, (x - touched).norm());

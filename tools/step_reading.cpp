@@ -1,5 +1,6 @@
 #include "tools/step_reading.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cctype>
 #include <limits>
@@ -36,6 +37,8 @@ double largest_penetration(const Term& term, const TermStepData& data, const Vec
     const TermGroup& g = term.groups()[gi];
     const double* theta = data.theta[gi].data();  // κ, inflation, centre: one row for the whole group
     const Vec3 centre(theta[2], theta[3], theta[4]);
+    const Mat3 rotation =
+        Eigen::Quaterniond(theta[5], theta[6], theta[7], theta[8]).normalized().toRotationMatrix();
     for (int e = 0; e < g.num_elements; ++e)
       for (int q = 0; q < g.num_points; ++q) {
         const double* rest = g.rest.data() + 4 * (static_cast<std::size_t>(e) * g.num_points + q);
@@ -43,7 +46,7 @@ double largest_penetration(const Term& term, const TermStepData& data, const Vec
         for (int i = 0; i < g.num_nodes; ++i)
           x += g.node_by_row[static_cast<std::size_t>(q) * g.padded_nodes + i] *
                u.segment<3>(3 * g.nodes[static_cast<std::size_t>(e) * g.num_nodes + i]);
-        const GapJet jet = shape.evaluate(x - centre);
+        const GapJet jet = shape.evaluate(rotation.transpose() * (x - centre));
         if (jet.supported) deepest = std::max(deepest, theta[1] + rest[3] - jet.gap);
       }
   }
@@ -79,16 +82,11 @@ StepReading read_step(const StepProblem& problem, const State& end) {
   const Model& model = problem.model();
   StepReading reading;
   reading.energies = problem.term_energies(end.u);
-  const StepInfo standstill{problem.step().index + 1, end.time, end.time + 1e-9};
-  const std::vector<double> stored =
-      StepProblem(model, problem.native(), standstill, end).term_energies(end.u);
-
   const std::vector<std::string> names = contact_names(model);
   reading.contacts.resize(names.size());
   reading.smallest_jacobian = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < model.terms.size(); ++k) {
     const Term& term = model.terms[k];
-    if (!is_friction(term)) reading.stored += stored[k];
     reading.smallest_jacobian = std::min(reading.smallest_jacobian, term.smallest_jacobian(end.u));
     const std::string body = body_of(term);
     if (body.empty()) continue;

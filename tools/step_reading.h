@@ -28,7 +28,6 @@ struct ContactReading {
 
 struct StepReading {
   std::vector<double> energies;          ///< [terms] in the step's potential, mJ
-  double stored = 0;                     ///< stored by all terms at the end of the step, mJ
   std::vector<ContactReading> contacts;  ///< per contact term, in the order of contact_names
   double smallest_jacobian = 1;          ///< min det F over the points of the skin
   double largest_displacement = 0;       ///< mm, over nodes
@@ -37,8 +36,7 @@ struct StepReading {
 /// Bodies with a contact term: "base", then the colliders, as named in the scene.
 std::vector<std::string> contact_names(const Model& model);
 
-/// Reads a converged step. The energy stored after it is the energy of a step from its end state that lasts
-/// 1e-9 s and does not move: nothing relaxes in it (to dt/τ), nothing slides.
+/// Reads a converged step.
 StepReading read_step(const StepProblem& problem, const State& end);
 
 }  // namespace rhytid::tools

@@ -7,14 +7,42 @@
 namespace rhytid::tools {
 namespace {
 
+bool may_dissipate(const Term& term) {
+  return term.kernels().ns > 0;
+}
+
+bool has_moving_body(const Term& term) {
+  return term.name().starts_with("contact ") || term.name().starts_with("friction ");
+}
+
+/// Columns that sum over the run.
+std::vector<std::string> summed_columns(const Model& model) {
+  std::vector<std::string> names;
+  for (const Term& term : model.terms) {
+    if (may_dissipate(term)) names.push_back("dissipated_" + column_name(term.name()));
+    if (has_moving_body(term)) names.push_back("work_" + column_name(term.name()));
+  }
+  for (const char* total :
+       {"collider_work", "rim_work", "dissipated_energy", "numerical_dissipation", "energy_imbalance"})
+    names.emplace_back(total);
+  return names;
+}
+
 std::vector<CsvColumn> columns(const Model& model) {
   std::vector<CsvColumn> list = {{"step", ""}, {"frame", ""}, {"time", "s"}, {"dt", "s"}};
   for (const Term& term : model.terms)
     list.push_back({column_name(term.name()) +
                         (energy_kind(term) == EnergyKind::incremental ? "_incremental" : "_energy"),
                     "mJ"});
-  for (const char* name : {"stored_energy", "collider_work", "dissipated_estimate"})
-    list.push_back({name, "mJ"});
+  for (const Term& term : model.terms)
+    for (int part = 0; part < term.kernels().num_stored; ++part) {
+      const std::string suffix = term.kernels().num_stored > 1
+                                     ? std::string("_") + term.kernels().stored_names[part]
+                                     : std::string();
+      list.push_back({"stored_" + column_name(term.name()) + suffix, "mJ"});
+    }
+  list.push_back({"stored_energy", "mJ"});
+  for (const std::string& name : summed_columns(model)) list.push_back({name, "mJ"});
   for (const char* name : {"iterations", "evaluations", "factorisations", "bisections"})
     list.push_back({name, ""});
   list.push_back({"residual", "N"});
@@ -29,36 +57,40 @@ std::vector<CsvColumn> columns(const Model& model) {
   return list;
 }
 
-/// Where the bodies stand at time 0, untouched.
-std::vector<ContactReading> bodies_at_rest(const Model& model) {
-  const State rest = model.rest_state();
-  const StepInfo standstill{0, -1e-9, 0};
-  return read_step(StepProblem(model, model.native, standstill, rest), rest).contacts;
+/// What a step adds to each of summed_columns.
+std::vector<double> summed_values(const Model& model, const EnergyAccount& account) {
+  std::vector<double> values;
+  for (std::size_t k = 0; k < model.terms.size(); ++k) {
+    if (may_dissipate(model.terms[k])) values.push_back(account.terms[k].dissipated);
+    if (has_moving_body(model.terms[k])) values.push_back(account.terms[k].work);
+  }
+  for (const double total :
+       {account.work, account.rim_work, account.dissipated, account.numerical, account.imbalance})
+    values.push_back(total);
+  return values;
 }
 
 }  // namespace
 
-StepTable::StepTable(const Model& model)
-    : num_bodies_(contact_names(model).size()), table_(columns(model)), last_(bodies_at_rest(model)) {}
-
-void StepTable::advance_work(const StepReading& reading) {
-  // The skin pushes the body by `force`, so the body does −force·motion on the skin.
-  for (std::size_t k = 0; k < num_bodies_; ++k)
-    work_ -=
-        0.5 * (last_[k].force + reading.contacts[k].force).dot(reading.contacts[k].centre - last_[k].centre);
-  last_ = reading.contacts;
-}
+StepTable::StepTable(const Model& model) : table_(columns(model)), sums_(summed_columns(model).size(), 0.0) {}
 
 void StepTable::add(const StepEvent& event) {
   const StepReading reading = read_step(event.problem, event.state);
-  advance_work(reading);
-  if (event.record.frame == 0) work_ = reading.stored;  // what it took to put the skin under tension
+  const EnergyAccount account = account_step(event.problem, event.state);
+  // What it took to put the skin under tension before frame 0 is nobody's work.
+  if (event.record.frame > 0) {
+    const std::vector<double> added = summed_values(event.problem.model(), account);
+    for (std::size_t k = 0; k < sums_.size(); ++k) sums_[k] += added[k];
+  }
   const MinimiserReport& report = event.record.report;
   const auto count = [](auto n) { return CsvCell(static_cast<std::int64_t>(n)); };
   std::vector<CsvCell> row = {count(table_.num_rows() + 1), count(event.record.frame), event.record.step.t,
                               event.record.step.dt()};
   for (const double energy : reading.energies) row.emplace_back(energy);
-  for (const double energy : {reading.stored, work_, work_ - reading.stored}) row.emplace_back(energy);
+  for (const TermAccount& term : account.terms)
+    for (const StoredPart& part : term.stored) row.emplace_back(part.energy);
+  row.emplace_back(account.stored);
+  for (const double sum : sums_) row.emplace_back(sum);
   for (const int n : {report.iterations, report.evaluations, report.factorisations, event.record.bisections})
     row.push_back(count(n));
   for (const double value : {report.residual, report.tolerance, report.smallest_pivot,
@@ -70,10 +102,7 @@ void StepTable::add(const StepEvent& event) {
 }
 
 std::vector<double> StepTable::carried() const {
-  std::vector<double> values = {work_};
-  for (const ContactReading& c : last_)
-    for (const Vec3& v : {c.force, c.centre}) values.insert(values.end(), v.data(), v.data() + 3);
-  return values;
+  return sums_;
 }
 
 void StepTable::restore(const std::string& csv, int last_frame, const std::vector<double>& carried,
@@ -83,8 +112,7 @@ void StepTable::restore(const std::string& csv, int last_frame, const std::vecto
   };
   std::istringstream lines(csv);
   std::string line;
-  if (!std::getline(lines, line) || line + "\n" != table_.text() || carried.size() != 1 + 6 * num_bodies_)
-    refuse();
+  if (!std::getline(lines, line) || line + "\n" != table_.text() || carried.size() != sums_.size()) refuse();
   while (std::getline(lines, line)) {
     // Numbers only, so that the cells are the text between commas; kept as text they come back unchanged.
     std::vector<CsvCell> cells;
@@ -94,11 +122,7 @@ void StepTable::restore(const std::string& csv, int last_frame, const std::vecto
     if (std::stoi(std::get<std::string>(cells[1])) > last_frame) break;
     table_.add_row(std::move(cells));
   }
-  work_ = carried[0];
-  for (std::size_t k = 0; k < num_bodies_; ++k) {
-    last_[k].force = Vec3(carried.data() + 1 + 6 * k);
-    last_[k].centre = Vec3(carried.data() + 4 + 6 * k);
-  }
+  sums_ = carried;
 }
 
 }  // namespace rhytid::tools

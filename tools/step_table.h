@@ -9,10 +9,9 @@
 namespace rhytid::tools {
 
 /// Columns: step, frame, time; energy per term in the step's potential (the name says `incremental` where it
-/// includes dissipation); stored energy, work done by the colliders since rest (trapezoidal in their motion)
-/// and their difference, an estimate of
-/// what was dissipated, good to the error of the trapezoidal rule; minimiser; extremes; force and penetration
-/// per body.
+/// includes dissipation); the energy account (sim/time/energy_account.h): stored by part now, and since the
+/// start of the run what was dissipated and what bodies did, by term, then the totals, the numerical
+/// dissipation and what is left over; minimiser; extremes; force and penetration per body.
 class StepTable {
  public:
   explicit StepTable(const Model& model);
@@ -20,7 +19,7 @@ class StepTable {
   void add(const StepEvent& event);
   const CsvTable& table() const { return table_; }
 
-  /// What the next row needs besides its step: for a checkpoint. work, then force and centre per body.
+  /// What the next row needs besides its step, for a checkpoint: the sums since the start.
   std::vector<double> carried() const;
   /// Continues a table: rows of `csv` (text of an earlier table) up to frame `last_frame`, and what was
   /// carried. Throws InputError naming `path` when the columns differ.
@@ -28,12 +27,8 @@ class StepTable {
                const std::string& path);
 
  private:
-  void advance_work(const StepReading& reading);
-
-  std::size_t num_bodies_;
   CsvTable table_;
-  double work_ = 0;  ///< mJ
-  std::vector<ContactReading> last_;
+  std::vector<double> sums_;  ///< mJ, of the columns that sum over the run
 };
 
 }  // namespace rhytid::tools

@@ -26,6 +26,9 @@ struct PictureSolid {
 /// A capsule around the segment a–b (a sphere when a = b), mm.
 PictureSolid capsule_solid(const Vec3& a, const Vec3& b, double radius);
 
+/// An ellipsoid with semi-axes (mm) along the columns of `rotation`.
+PictureSolid ellipsoid_solid(const Vec3& centre, const Mat3& rotation, const Vec3& semi_axes);
+
 /// A scalar painted on the surface.
 struct PictureField {
   VectorXd values;    ///< [surface.num_vertices()]; NaN is drawn grey

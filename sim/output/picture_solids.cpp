@@ -40,4 +40,15 @@ PictureSolid capsule_solid(const Vec3& a, const Vec3& b, double radius) {
   return solid;
 }
 
+PictureSolid ellipsoid_solid(const Vec3& centre, const Mat3& rotation, const Vec3& semi_axes) {
+  require(semi_axes.minCoeff() > 0, "ellipsoid_solid: semi-axes must be positive");
+  PictureSolid solid = capsule_solid(Vec3::Zero(), Vec3::Zero(), 1);
+  for (Eigen::Index i = 0; i < solid.vertices.rows(); ++i) {
+    const Vec3 on_ball = solid.vertices.row(i).transpose();
+    solid.vertices.row(i) = (centre + rotation * semi_axes.cwiseProduct(on_ball)).transpose();
+    solid.normals.row(i) = (rotation * on_ball.cwiseQuotient(semi_axes)).normalized().transpose();
+  }
+  return solid;
+}
+
 }  // namespace rhytid

@@ -143,6 +143,7 @@ template <class Archive, FieldsOf<PathKnot> T>
 void fields(Archive& archive, T& knot) {
   archive("time", knot.time);
   archive("position", knot.position);
+  archive("rotation", knot.rotation);
 }
 
 template <class Archive, FieldsOf<ColliderScene> T>
@@ -150,11 +151,19 @@ void fields(Archive& archive, T& collider) {
   archive("name", collider.name);
   archive("shape", collider.shape);
   archive("radius", collider.radius);
+  archive("length", collider.length);
+  archive("axis", collider.axis);
+  archive("semi_axes", collider.semi_axes);
   archive("normal", collider.normal);
   archive("stiffness", collider.stiffness);
   archive("onset", collider.onset);
   archive("friction", collider.friction);
-  archive("path", collider.path);
+  archive("interpolation", collider.interpolation);
+  // Written out in full, wherever it was read from: what a run records does not need the file.
+  if (archive.has("path_file", false))
+    archive("path_file", collider.path_file);
+  else
+    archive("path", collider.path);
 }
 
 template <class Archive, FieldsOf<TimeScene> T>
@@ -162,6 +171,7 @@ void fields(Archive& archive, T& time) {
   archive("frame_rate", time.frame_rate);
   archive("frames", time.frames);
   archive("substeps", time.substeps);
+  archive("lag_passes", time.lag_passes);
   archive("max_bisections", time.max_bisections);
   archive("damper", time.damper);
 }

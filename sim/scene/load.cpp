@@ -1,10 +1,14 @@
 #include "sim/scene/load.h"
 
 #include <algorithm>
+#include <numbers>
 
+#include "sim/core/error.h"
+#include "sim/scene/collider_motion.h"
 #include "sim/scene/fields.h"
 #include "sim/scene/located_json.h"
 #include "sim/scene/names.h"
+#include "sim/scene/read_path.h"
 #include "sim/scene/validate.h"
 #include "sim/scene/vertex_values.h"
 
@@ -150,6 +154,22 @@ void read_vertex_files(Scene& scene, const LocatedJson& resolved) {
     scene.ligaments->b_by_vertex = read(scene.ligaments->map, "/ligaments/map");
 }
 
+/// Refuses turns whose direction is anybody's guess, and splines through too many knots.
+void check_motion(const ColliderScene& collider, const std::string& file) {
+  const std::string at = (file.empty() ? "" : file + ": ") + "/colliders/" + collider.name;
+  const std::size_t knots = collider.path.size();
+  if (collider.interpolation != PathKind::linear && knots > KnotPath::max_spline_knots)
+    throw InputError(at + "/interpolation", "a spline through " + std::to_string(knots) + " knots",
+                     "at most " + std::to_string(KnotPath::max_spline_knots) + ", or linear");
+  for (std::size_t k = 1; k < knots; ++k) {
+    const double degrees = angle_between(collider.path[k - 1], collider.path[k]) * 180 / std::numbers::pi;
+    if (degrees > 170)
+      throw InputError(at + "/path/" + std::to_string(k) + "/rotation",
+                       "a turn by " + std::to_string(degrees) + " deg from the knot before",
+                       "at most 170 deg; put a knot between");
+  }
+}
+
 Scene to_scene(const LocatedJson& located, const std::string& file) {
   const LocatedJson resolved = resolve_against_rules(located);
   check_consistency(resolved);
@@ -158,6 +178,10 @@ Scene to_scene(const LocatedJson& located, const std::string& file) {
   fields(reader, scene);
   scene.file = file;
   read_vertex_files(scene, resolved);
+  for (ColliderScene& collider : scene.colliders) {
+    if (!collider.path_file.empty()) collider.path = read_path(collider.path_file);
+    check_motion(collider, file);
+  }
   return scene;
 }
 

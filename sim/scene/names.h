@@ -36,7 +36,11 @@ struct EnumNames<VolumeQuadrature> {
 };
 template <>
 struct EnumNames<ShapeKind> {
-  static constexpr std::array<std::string_view, 3> words{"sphere", "plane", "imls"};
+  static constexpr std::array<std::string_view, 5> words{"sphere", "plane", "imls", "capsule", "ellipsoid"};
+};
+template <>
+struct EnumNames<PathKind> {
+  static constexpr std::array<std::string_view, 3> words{"linear", "spline", "clamped_spline"};
 };
 
 /// The word for a value: "exponential", "clamped", ...

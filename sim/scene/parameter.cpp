@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "sim/core/error.h"
+#include "sim/scene/collider_motion.h"
 #include "sim/scene/located_json.h"
 #include "sim/scene/nearest.h"
 #include "sim/scene/rules.h"
@@ -58,7 +59,7 @@ const Kind kinds[] = {
      [](Scene& s, size_t) { return s.base ? &s.base->stiffness : nullptr; }},
     {"/colliders/*/radius", 0.1, 100, log,
      [](Scene& s, size_t i) {
-       return s.colliders[i].shape == ShapeKind::sphere ? &s.colliders[i].radius : nullptr;
+       return collider_radius(s.colliders[i]) > 0 ? &s.colliders[i].radius : nullptr;
      }},
     {"/colliders/*/stiffness", 1e-3, 1e3, log, [](Scene& s, size_t i) { return &s.colliders[i].stiffness; }},
     {"/colliders/*/friction/coefficient", 1e-3, 5, log,

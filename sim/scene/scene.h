@@ -9,6 +9,7 @@
 
 #include "sim/core/types.h"
 #include "sim/scene/damper_scheme.h"
+#include "sim/terms/path.h"
 
 namespace rhytid {
 
@@ -16,7 +17,7 @@ enum class RimCondition { clamped, sliding, free };
 enum class ThicknessScheme { stacked, composite };
 enum class LigamentForm { exponential, fung_quadratic };
 enum class VolumeQuadrature { full, reduced };
-enum class ShapeKind { sphere, plane, imls };
+enum class ShapeKind { sphere, plane, imls, capsule, ellipsoid };
 
 struct LayerScene {
   std::string name;
@@ -96,19 +97,26 @@ struct BaseScene {
   std::optional<PointsScene> points;   ///< imls: a cloud with normals in place of the inner surface
 };
 
+/// Where a body is at a time; between knots it is interpolated, outside it stays.
 struct PathKnot {
-  double time;
-  Vec3 position;
-};  ///< s, mm; linear between knots, constant outside
+  double time;                   ///< s
+  Vec3 position;                 ///< mm
+  Vec3 rotation = Vec3::Zero();  ///< axis times angle, rad
+};
 
 struct ColliderScene {
   std::string name;
   ShapeKind shape = ShapeKind::sphere;
-  double radius = 8;            ///< mm
-  Vec3 normal = Vec3::UnitZ();  ///< plane: outward normal
-  double stiffness = 1;         ///< kappa, MPa/mm
-  double onset = 1e-3;          ///< eps_g, mm
+  double radius = 8;              ///< mm; sphere and capsule
+  double length = 0;              ///< capsule: between the centres of its ends, mm
+  Vec3 axis = Vec3::UnitZ();      ///< capsule: its direction, in the body's axes
+  Vec3 semi_axes = Vec3::Zero();  ///< ellipsoid, mm, along the body's axes
+  Vec3 normal = Vec3::UnitZ();    ///< plane: outward normal
+  double stiffness = 1;           ///< kappa, MPa/mm
+  double onset = 1e-3;            ///< eps_g, mm
   std::optional<FrictionScene> friction;
+  PathKind interpolation = PathKind::linear;
+  std::string path_file;  ///< CSV that `path` is read from; empty when the scene holds it
   std::vector<PathKnot> path;
 };
 
@@ -116,6 +124,7 @@ struct TimeScene {
   double frame_rate = 24;  ///< 1/s
   int frames = 0;          ///< frames after the rest frame 0
   int substeps = 1;        ///< per frame
+  int lag_passes = 1;      ///< solves per step over the lag of friction
   int max_bisections = 4;
   DamperScheme damper = DamperScheme::exponential;
 };

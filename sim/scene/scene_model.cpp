@@ -45,6 +45,7 @@ RunOptions SceneModel::run_options() const {
   o.frames = scene_.time.frames;
   o.substeps = scene_.time.substeps;
   o.settle = scene_.skin.pre_stretch.has_value();
+  o.lag_passes = scene_.time.lag_passes;
   o.max_bisections = scene_.time.max_bisections;
   MinimiserOptions& m = o.minimiser;
   m.method = scene_.solver.minimiser == "lbfgs"              ? Minimiser::lbfgs

@@ -196,7 +196,7 @@ void require_unique_names(const LocatedJson& scene, const json& list, const std:
 }
 
 void require_direction(const LocatedJson& scene, const json& holder, const std::string& pointer,
-                       const std::string& key = "normal") {
+                       const std::string& key) {
   const json& normal = holder[key];
   double largest = 0;
   for (const json& component : normal) largest = std::max(largest, std::abs(component.get<double>()));
@@ -255,6 +255,18 @@ void check_skin(const LocatedJson& scene) {
       }
 }
 
+/// Positive, and no flatter than the nearest point to a place can be found for (sim/surface/shapes.h).
+void require_semi_axes(const LocatedJson& scene, const json& semi_axes, const std::string& pointer) {
+  double smallest = semi_axes[0], largest = smallest;
+  for (const json& length : semi_axes) {
+    smallest = std::min(smallest, length.get<double>());
+    largest = std::max(largest, length.get<double>());
+  }
+  if (smallest <= 0 || largest > 1000 * smallest)
+    throw InputError(scene.where(pointer) + ": " + pointer, shown_json(semi_axes),
+                     "three lengths > 0 mm, the longest at most 1000 times the shortest");
+}
+
 }  // namespace
 
 LocatedJson resolve_against_rules(const LocatedJson& scene, const RuleNode& rules) {
@@ -273,7 +285,7 @@ void check_consistency(const LocatedJson& scene) {
   check_skin(scene);
   if (root.contains("base")) {
     const json& base = root["base"];
-    require_direction(scene, base, "/base");
+    require_direction(scene, base, "/base", "normal");
     if (base["shape"] == "sphere" && base["radius"].get<double>() <= 0)
       throw InputError(scene.where("/base/radius") + ": /base/radius", shown_json(base["radius"]),
                        "a length > 0 mm, since the base is a sphere");
@@ -283,7 +295,11 @@ void check_consistency(const LocatedJson& scene) {
   }
   for (size_t i = 0; i < root["colliders"].size(); ++i) {
     const json& collider = root["colliders"][i];
-    require_direction(scene, collider, "/colliders/" + std::to_string(i));
+    const std::string at = "/colliders/" + std::to_string(i);
+    require_direction(scene, collider, at, "normal");
+    require_direction(scene, collider, at, "axis");
+    if (collider["shape"] == "ellipsoid") require_semi_axes(scene, collider["semi_axes"], at + "/semi_axes");
+    if (!collider.contains("path")) continue;
     const json& path = collider["path"];
     for (size_t k = 1; k < path.size(); ++k)
       if (path[k]["time"].get<double>() <= path[k - 1]["time"].get<double>()) {

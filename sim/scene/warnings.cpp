@@ -68,9 +68,11 @@ void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
   if (time.frames > 0 && collider.path.front().time > end)
     warnings.push_back(sentence(at, "/path: starts at ", time_text(collider.path.front().time),
                                 ", after the last frame at ", time_text(end), ", so that it never moves"));
-  if (collider.shape != ShapeKind::sphere) return;
+  if (collider.shape == ShapeKind::plane) return;
+  const bool is_ellipsoid = collider.shape == ShapeKind::ellipsoid;
+  const double size = is_ellipsoid ? collider.semi_axes.minCoeff() : collider.radius;
   // Lagged friction is only good while the contact moves by less than a quarter of its radius in a step, and
-  // the contact is smaller than the sphere.
+  // the contact is smaller than the body.
   double fastest = 0;
   for (size_t k = 1; k < collider.path.size(); ++k) {
     const PathKnot &a = collider.path[k - 1], &b = collider.path[k];
@@ -78,14 +80,15 @@ void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
     const double distance = (b.position - a.position).norm();
     fastest = std::max(fastest, distance * std::min(1., step / (b.time - a.time)));
   }
-  if (fastest > 2 * collider.radius) {
+  if (fastest > 2 * size) {
     warnings.push_back(sentence(at, "/path: moves ", length_text(fastest),
                                 " in one step, more than its diameter, so that it may pass through the skin "
                                 "between two steps; raise /time/substeps"));
-  } else if (collider.friction && fastest > collider.radius / 4) {
-    warnings.push_back(sentence(
-        at, "/path: moves ", length_text(fastest), " in one step, more than a quarter of its radius ",
-        length_text(collider.radius), ", so that lagged friction is inaccurate; raise /time/substeps"));
+  } else if (collider.friction && fastest > size / 4) {
+    warnings.push_back(sentence(at, "/path: moves ", length_text(fastest),
+                                " in one step, more than a quarter of its ",
+                                is_ellipsoid ? "shortest semi-axis " : "radius ", length_text(size),
+                                ", so that lagged friction is inaccurate; raise /time/substeps"));
   }
 }
 

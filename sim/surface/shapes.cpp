@@ -1,5 +1,6 @@
 #include "sim/surface/shapes.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/core/error.h"
@@ -34,6 +35,32 @@ GapJet Plane::evaluate(const Vec3& x) const {
   GapJet jet;
   jet.gap = normal_.dot(x);
   jet.gradient = normal_;
+  return jet;
+}
+
+Capsule::Capsule(double radius, double half_length, const Vec3& axis)
+    : radius_(radius), half_length_(half_length) {
+  require(std::isfinite(radius) && radius > 0, "Capsule: radius must be finite and positive");
+  require(std::isfinite(half_length) && half_length >= 0, "Capsule: half_length must not be negative");
+  const double length = axis.stableNorm();
+  require(std::isfinite(length) && length > 0, "Capsule: axis must be finite and not zero");
+  axis_ = (axis / length).normalized();
+}
+
+GapJet Capsule::evaluate(const Vec3& x) const {
+  GapJet jet;
+  const double along = axis_.dot(x), clamped = std::clamp(along, -half_length_, half_length_);
+  Vec3 d = x - clamped * axis_;
+  if (clamped == along) d -= axis_.dot(d) * axis_;  // exactly across, whatever the rounding
+  const double r = d.stableNorm();
+  jet.gap = r - radius_;
+  // As for a sphere: nearer to the segment than rounding there is no direction.
+  if (r <= 1e-15 * (radius_ + half_length_)) return jet;
+  const Vec3 n = d / r;
+  jet.gradient = n;
+  jet.hessian = Mat3::Identity() - n * n.transpose();
+  if (clamped == along) jet.hessian -= axis_ * axis_.transpose();
+  jet.hessian /= r;
   return jet;
 }
 

@@ -1,13 +1,22 @@
-// Rigid bodies with a closed-form signed distance: sphere and plane.
+// Rigid bodies given by their exact signed distance: sphere, plane, capsule and ellipsoid.
 //
-// Sphere  g = ±(|x| − R), ∇g = ±n, ∇²g = ±(I − n nᵀ)/|x|, n = x/|x|.
-// Plane   g = n·x, ∇g = n, ∇²g = 0.
+// Sphere     g = ±(|x| − R), ∇g = ±n, ∇²g = ±(I − n nᵀ)/|x|, n = x/|x|.
+// Plane      g = n·x, ∇g = n, ∇²g = 0.
+// Capsule    g = |x − s| − R, s the point of the axis segment nearest to x; beside the segment
+//            ∇²g = (I − n nᵀ − a aᵀ)/|x − s|, around its ends that of a sphere.
+// Ellipsoid  g = ±|x − y|, y the point of Σ y²ᵢ/e²ᵢ = 1 nearest to x: yᵢ = e²ᵢ xᵢ/(t + e²ᵢ), t the largest
+//            root of Σ (eᵢ xᵢ/(t + e²ᵢ))² = 1.  n ∝ yᵢ/e²ᵢ;  ∇²g = W (I + g W)⁻¹, W the curvature at y.
+//
+// The distance, and not a cheaper implicit function with unit slope at the surface only: penetration then has
+// the same meaning (mm along the normal) on every shape, so that κ and the onset do too, and R is an offset.
 //
 // Source  paper.tex "Contact" (finger as an implicit sphere). Skin under a finger and skin over a round skull
 //         both lie outside the ball, so they share Side::outside.
-// Smooth  analytic; the sphere except at its centre, where direction and curvature do not exist: both are
-//         returned as zero there (the mean over all directions), so that nothing becomes NaN.
-// Tests   tests/sim/surface/shapes_test.cpp
+// Smooth  sphere, plane and ellipsoid analytic, the capsule C¹ where its ends begin (the curvature jumps);
+//         all except where the nearest point is not unique, deep inside. At the centre of a sphere and on the
+//         axis of a capsule direction and curvature are returned as zero (the mean over all directions); the
+//         ellipsoid takes the nearest point with positive coordinates, and bounds the curvature.
+// Tests   tests/sim/surface/shapes_test.cpp, ellipsoid_test.cpp
 #pragma once
 
 #include "sim/surface/implicit_shape.h"
@@ -43,6 +52,40 @@ class Plane final : public ImplicitShape {
 
  private:
   Vec3 normal_;
+};
+
+/// All points within R (mm) of a segment through the origin of its frame.
+class Capsule final : public ImplicitShape {
+ public:
+  /// `half_length` mm from the origin to either end of the segment, along `axis` of any length. Throws
+  /// ContractError unless radius > 0, half_length ≥ 0 and the axis is not zero.
+  Capsule(double radius, double half_length, const Vec3& axis = Vec3::UnitZ());
+  GapJet evaluate(const Vec3& x) const override;
+  double gap_by_radius() const override { return -1; }
+  double radius() const { return radius_; }
+  /// Ends of the segment.
+  Vec3 end(int which) const { return (which == 0 ? -half_length_ : half_length_) * axis_; }
+
+ private:
+  double radius_, half_length_;
+  Vec3 axis_;
+};
+
+/// Solid ellipsoid around the origin of its frame, semi-axes along the axes of the frame.
+class Ellipsoid final : public ImplicitShape {
+ public:
+  /// Semi-axes in mm; throws ContractError unless they are positive and no longer than 1000 times the
+  /// shortest.
+  explicit Ellipsoid(const Vec3& semi_axes);
+  GapJet evaluate(const Vec3& x) const override;
+  const Vec3& semi_axes() const { return semi_axes_; }
+
+ private:
+  /// Nearest point to x of the surface, in the octant of x; `multiplier` is t in x − y = t y/e².
+  Vec3 nearest_point(const Vec3& x, double& multiplier) const;
+
+  Vec3 semi_axes_;
+  int shortest_;
 };
 
 }  // namespace rhytid

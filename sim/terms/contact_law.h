@@ -1,23 +1,25 @@
 // Penalty contact of a surface point with a rigid implicit shape, and the friction lagged from it; per area.
 //
-//   contact   Ψ = κ φ(d), d = g₀ − g(x):  d³/(3ε) below ε, ε²/3 + ε(d−ε) + (d−ε)² above (C², κ g² for ε → 0)
-//   friction  Ψ = μ f_n D(|u_T|; ε_v dt), u_T = (I − n nᵀ)(u − u_old − (c − c_old)); f_n, n from the last
-//   converged step
-//             quintic   D = δ⁶/ε⁵ − 3δ⁵/ε⁴ + 5δ⁴/(2ε³) | δ − ε/2 ;  quadratic (IPC)  δ²/ε − δ³/(3ε²) | δ −
-//             ε/3
+//   contact   Ψ = κ φ(d), d = g₀ + ΔR − g(Rᵀ(x − c)):  d³/(3ε) below ε, ε²/3 + ε(d−ε) + (d−ε)² above
+//             (C², κ d² for ε → 0)
+//   friction  Ψ = μ f_n D(|u_T|; ε_v dt), u_T = (I − n nᵀ)(x − x_b), x_b = c + R R_oldᵀ (x_old − c_old):
+//   where
+//             the body, moving and turning, has carried the place that x lay on; f_n, n from the last
+//             converged step or pass (sim/time/simulate.h)
+//             quintic   D = δ⁶/ε⁵ − 3δ⁵/ε⁴ + 5δ⁴/(2ε³) | δ − ε/2
+//             quadratic D = δ²/ε − δ³/(3ε²) | δ − ε/3   (IPC)
 //
 // The shape gives value, gradient and Hessian of its gap in plain numbers; other scalars are lifted through
-// them, so a new shape needs nothing here. `inflation` [mm] is the amount by which the radius differs from
+// them, so a new shape needs nothing here. `inflation` ΔR [mm] is the amount by which the radius differs from
 // the shape's own.
 //
 // Source   paper.tex "Contact", "Friction"; deviations: κ in MPa/mm, C² onset, rest gap g₀ subtracted on the
-// base,
-//          friction on the displacement of the step (the velocity form as printed is 1/dt too strong).
-// Units    κ [MPa/mm], ε [mm], f_n [MPa], u, c [mm], ε_v [mm/s].
-// Shapes   contact θ = κ, inflation, c [3]; friction θ = κ, inflation, μ, c [3], c_old [3]; lag = f_n, n [3].
-//          rest = X [3], g₀.
+//          base, friction on the displacement of the step (the velocity form as printed is 1/dt too strong).
+// Units    κ [MPa/mm], ε [mm], f_n [MPa], x = X + u, c [mm], ε_v [mm/s].
+// Shapes   contact θ = κ, inflation, c [3], q [4]; friction θ = κ, inflation, μ, c [3], c_old [3], q [4],
+//          q_old [4]; lag = f_n, n [3]; rest = X [3], g₀. R from the quaternion q (body_frame.h).
 // Smooth   contact C² (ε > 0) or C¹; friction C² (quintic) or C¹ (quadratic).
-// Tests    tests/sim/terms/law_edges_test.cpp, law_properties_test.cpp
+// Tests    tests/sim/terms/law_edges_test.cpp, law_properties_test.cpp, rotating_contact_test.cpp
 #pragma once
 
 #include <array>
@@ -26,11 +28,12 @@
 
 #include "sim/math/dual.h"
 #include "sim/surface/implicit_shape.h"
+#include "sim/terms/body_frame.h"
 
 namespace rhytid {
 inline namespace RHYTID_ISA {
 
-/// Gap and gradient at x, for any scalar, through the shape's second-order jet.
+/// Gap and gradient (in world axes) at a point, for any scalar, through the shape's second-order jet.
 template <class T>
 struct LiftedGap {
   T gap;
@@ -39,23 +42,29 @@ struct LiftedGap {
   bool inside;  ///< unsupported only: behind the nearest sample, i.e. hopelessly deep
 };
 
+/// Gap at X + u of a shape at c with orientation q.
 template <class T>
-LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* x_local) {
-  const Vec3 x0(value_of(x_local[0]), value_of(x_local[1]), value_of(x_local[2]));
+LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* u, const double* rest, const T* c, const T* q) {
+  const Rotation<T> rotation(q);
+  const T world[3] = {u[0] + rest[0] - c[0], u[1] + rest[1] - c[1], u[2] + rest[2] - c[2]};
+  T x[3], gradient[3];
+  rotation.to_local(world, x);
+  const Vec3 x0(value_of(x[0]), value_of(x[1]), value_of(x[2]));
   const GapJet jet = shape.evaluate(x0);
   LiftedGap<T> r;
   r.supported = jet.supported;
   r.inside = !jet.supported && shape.behind(x0);
-  const T dx[3] = {x_local[0] - x0[0], x_local[1] - x0[1], x_local[2] - x0[2]};
+  const T dx[3] = {x[0] - x0[0], x[1] - x0[1], x[2] - x0[2]};
   r.gap = T(jet.gap) + dx[0] * jet.gradient[0] + dx[1] * jet.gradient[1] + dx[2] * jet.gradient[2];
   for (int i = 0; i < 3; ++i)
-    r.gradient[i] = T(jet.gradient[i]) + dx[0] * jet.hessian(i, 0) + dx[1] * jet.hessian(i, 1) +
-                    dx[2] * jet.hessian(i, 2);
+    gradient[i] = T(jet.gradient[i]) + dx[0] * jet.hessian(i, 0) + dx[1] * jet.hessian(i, 1) +
+                  dx[2] * jet.hessian(i, 2);
+  rotation.to_world(gradient, r.gradient);
   return r;
 }
 
 struct ContactLaw {
-  static constexpr int ne = 3, ns = 0, np = 0, ntheta = 5, nrest = 4;
+  static constexpr int ne = 3, ns = 0, np = 0, ntheta = 9, nrest = 4;
   static constexpr const char* name = "contact";
   const ImplicitShape* shape = nullptr;
   double onset = 1e-3;  ///< ε, mm; 0 = C¹ penalty as printed
@@ -77,9 +86,8 @@ struct ContactLaw {
 
   template <class T>
   T stress(const T* u, const T*, const T* theta, const double* rest, double, T* traction) const {
-    const T x[3] = {u[0] + rest[0] - theta[2], u[1] + rest[1] - theta[3], u[2] + rest[2] - theta[4]};
     for (int i = 0; i < 3; ++i) traction[i] = T(0.0);
-    const LiftedGap<T> g = lift_gap(*shape, x);
+    const LiftedGap<T> g = lift_gap(*shape, u, rest, theta + 2, theta + 5);
     if (!g.supported) return T(g.inside ? std::numeric_limits<double>::infinity() : 0.0);
     const T depth = theta[1] + rest[3] - g.gap;
     if (!(value_of(depth) > 0)) return T(0.0);
@@ -92,10 +100,30 @@ struct ContactLaw {
   template <class T>
   void update(const T*, const T*, const T*, const double*, double, T*) const {}
 
+  /// Work of the moving body on the skin, per area: the mean of ∂Ψ/∂(c, q) at both ends of the step times
+  /// their change.
+  double body_work(const double* u_old, const double* u, const double*, const double* theta_old,
+                   const double* theta, const double* rest, double dt) const {
+    Dual<1> at_old[9], at_new[9], x_old[3], x[3], unused[3];
+    bool moves = false;
+    for (int k = 0; k < 9; ++k) {
+      at_old[k] = theta_old[k];
+      at_new[k] = theta[k];
+      at_old[k].d[0] = at_new[k].d[0] = theta[k] - theta_old[k];
+      moves = moves || theta[k] != theta_old[k];
+    }
+    if (!moves) return 0;
+    for (int i = 0; i < 3; ++i) {
+      x_old[i] = u_old[i];
+      x[i] = u[i];
+    }
+    return 0.5 * (stress<Dual<1>>(x_old, nullptr, at_old, rest, dt, unused).d[0] +
+                  stress<Dual<1>>(x, nullptr, at_new, rest, dt, unused).d[0]);
+  }
+
   static constexpr std::array<const char*, 3> regime_names = {"apart", "onset", "pressed"};
   signed char regime(const double* u, const double*, const double* theta, const double* rest, double) const {
-    const double x[3] = {u[0] + rest[0] - theta[2], u[1] + rest[1] - theta[3], u[2] + rest[2] - theta[4]};
-    const LiftedGap<double> g = lift_gap(*shape, x);
+    const LiftedGap<double> g = lift_gap(*shape, u, rest, theta + 2, theta + 5);
     const double depth = theta[1] + rest[3] - g.gap;
     if (!g.supported || !(depth > 0)) return 0;
     return depth < onset ? 1 : 2;
@@ -105,7 +133,7 @@ struct ContactLaw {
 enum class Mollifier { quintic, quadratic };
 
 struct FrictionLaw {
-  static constexpr int ne = 3, ns = 4, np = 7, ntheta = 9, nrest = 4;
+  static constexpr int ne = 3, ns = 4, np = 7, ntheta = 17, nrest = 4;
   static constexpr const char* name = "friction";
   const ImplicitShape* shape = nullptr;
   double onset = 1e-3;    ///< mm, as in the contact it belongs to
@@ -136,17 +164,26 @@ struct FrictionLaw {
     for (int i = 0; i < 3; ++i) prepared[4 + i] = u_old[i];
   }
 
+  /// u_T; returns |u_T|².
   template <class T>
-  T stress(const T* u, const T* prepared, const T* theta, const double*, double dt, T* traction) const {
-    const T &pressure = prepared[0], *n = prepared + 1, *u_old = prepared + 4;
-    for (int i = 0; i < 3; ++i) traction[i] = T(0.0);
-    if (!(value_of(pressure) > 0)) return T(0.0);
-    T slip[3];
-    for (int i = 0; i < 3; ++i) slip[i] = u[i] - u_old[i] - (theta[3 + i] - theta[6 + i]);
+  static T slip_of(const T* u, const T* prepared, const T* theta, const double* rest, T* slip) {
+    const T *n = prepared + 1, *u_old = prepared + 4, *c = theta + 3, *c_old = theta + 6;
+    T from_centre[3], carried[3];
+    for (int i = 0; i < 3; ++i) from_centre[i] = u_old[i] + rest[i] - c_old[i];
+    carried_by_turn(theta + 9, theta + 13, from_centre, carried);
+    for (int i = 0; i < 3; ++i) slip[i] = u[i] - u_old[i] - (c[i] - c_old[i]) - carried[i];
     const T along = slip[0] * n[0] + slip[1] * n[1] + slip[2] * n[2];
     for (int i = 0; i < 3; ++i) slip[i] -= along * n[i];
-    const T s = slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2];
-    T quotient;
+    return slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2];
+  }
+
+  template <class T>
+  T stress(const T* u, const T* prepared, const T* theta, const double* rest, double dt, T* traction) const {
+    const T& pressure = prepared[0];
+    for (int i = 0; i < 3; ++i) traction[i] = T(0.0);
+    if (!(value_of(pressure) > 0)) return T(0.0);
+    T slip[3], quotient;
+    const T s = slip_of(u, prepared, theta, rest, slip);
     const T strength = theta[2] * pressure;
     const T energy = strength * mollify(s, slip_speed * dt, quotient);
     const T f = strength * quotient;
@@ -159,9 +196,8 @@ struct FrictionLaw {
   template <class T>
   void update(const T* u, const T*, const T* theta, const double* rest, double, T* lag) const {
     using std::sqrt;
-    const T x[3] = {u[0] + rest[0] - theta[3], u[1] + rest[1] - theta[4], u[2] + rest[2] - theta[5]};
     for (int i = 0; i < 4; ++i) lag[i] = T(i == 3 ? 1.0 : 0.0);
-    const LiftedGap<T> g = lift_gap(*shape, x);
+    const LiftedGap<T> g = lift_gap(*shape, u, rest, theta + 3, theta + 9);
     if (!g.supported) return;
     const T depth = theta[1] + rest[3] - g.gap;
     if (!(value_of(depth) > 0)) return;
@@ -174,21 +210,33 @@ struct FrictionLaw {
     for (int i = 0; i < 3; ++i) lag[1 + i] = g.gradient[i] / length;
   }
 
+  static constexpr bool history_is_lag = true;
+  static constexpr std::array<const char*, 0> stored_names{};
+  void stored(const double*, const double*, const double*, const double*, double*) const {}
+  /// Traction times slip, per area; never negative.
+  double dissipated(const double*, const double*, const double* u, const double* prepared, const double*,
+                    const double* theta, const double* rest, double dt) const {
+    double slip[3], traction[3];
+    (void)slip_of(u, prepared, theta, rest, slip);
+    (void)stress<double>(u, prepared, theta, rest, dt, traction);
+    return traction[0] * slip[0] + traction[1] * slip[1] + traction[2] * slip[2];
+  }
+  /// Traction on the skin times the motion of the body's surface, which is Δu less the slip.
+  double body_work(const double* u_old, const double* u, const double* prepared, const double*,
+                   const double* theta, const double* rest, double dt) const {
+    double traction[3], work = dissipated(nullptr, nullptr, u, prepared, nullptr, theta, rest, dt);
+    (void)stress<double>(u, prepared, theta, rest, dt, traction);
+    for (int i = 0; i < 3; ++i) work -= traction[i] * (u[i] - u_old[i]);
+    return work;
+  }
+
   static constexpr std::array<const char*, 3> regime_names = {"unloaded", "stick", "slip"};
-  signed char regime(const double* u, const double* prepared, const double* theta, const double*,
+  signed char regime(const double* u, const double* prepared, const double* theta, const double* rest,
                      double dt) const {
     if (!(prepared[0] > 0)) return 0;
-    double slip[3], along = 0, s = 0;
-    for (int i = 0; i < 3; ++i) {
-      slip[i] = u[i] - prepared[4 + i] - (theta[3 + i] - theta[6 + i]);
-      along += slip[i] * prepared[1 + i];
-    }
-    for (int i = 0; i < 3; ++i) {
-      const double tangential = slip[i] - along * prepared[1 + i];
-      s += tangential * tangential;
-    }
+    double slip[3];
     const double eps = slip_speed * dt;
-    return s < eps * eps ? 1 : 2;
+    return slip_of(u, prepared, theta, rest, slip) < eps * eps ? 1 : 2;
   }
 };
 

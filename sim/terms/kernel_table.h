@@ -30,6 +30,15 @@ struct KernelTable {
                  signed char* out) = nullptr;
   int num_regimes = 0;
   const char* const* regime_names = nullptr;
+  /// Adds the energies of an element over a converged step; `theta_old` and its stride as in the view.
+  void (*account)(const void* law, const ElementView&, const double* theta_old, const double* u_old,
+                  const double* s_old, const double* u, const double* prepared, const double* s_new,
+                  TermEnergies* sum) = nullptr;
+  int num_stored = 0;
+  const char* const* stored_names = nullptr;
+  /// The history is nothing but what lags behind the step, so that a step may be solved again with its own
+  /// (friction; sim/time/step_passes.h).
+  bool history_is_lag = false;
 };
 
 inline namespace RHYTID_ISA {
@@ -66,6 +75,15 @@ constexpr KernelTable kernel_table() {
          const double* p, const double* adj, const double* sb, double* uob, double* sob, double* tb) {
         K::adjoint_step(*static_cast<const Law*>(l), v, u, uo, so, p, adj, sb, uob, sob, tb);
       }};
+  table.account = [](const void* l, const ElementView& v, const double* to, const double* uo,
+                     const double* so, const double* u, const double* p, const double* s, TermEnergies* sum) {
+    K::account(*static_cast<const Law*>(l), v, to, uo, so, u, p, s, *sum);
+  };
+  table.num_stored = static_cast<int>(K::stored_names.size());
+  table.stored_names = K::stored_names.data();
+  table.history_is_lag = requires {
+    Law::history_is_lag;
+  };
   if constexpr (K::has_regimes) {
     table.regime = [](const void* l, const ElementView& v, const double* u, const double* p,
                       signed char* out) { K::regime(*static_cast<const Law*>(l), v, u, p, out); };

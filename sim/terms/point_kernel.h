@@ -21,6 +21,7 @@
 #include "sim/terms/element_sums.h"
 #include "sim/terms/kinematics.h"
 #include "sim/terms/packed_kernel.h"
+#include "sim/terms/term_energies.h"
 
 namespace rhytid {
 
@@ -190,6 +191,54 @@ struct PointKernel {
       point(v, natural, q, z);
       Kin::strain(z, e);
       out[q] = law.regime(e, prepared + q * np, theta(v, q), rest(v, q), v.dt);
+    }
+  }
+
+  static constexpr auto stored_names = stored_names_of<Law>();
+  static_assert(stored_names.size() <= 3);
+
+  /// Stored energy density by part. A law without a list of its own stores its energy (np = 0).
+  static void stored(const Law& law, const double* e, const double* s, const double* theta,
+                     const double* rest_point, double dt, double* out) {
+    if constexpr (requires { Law::stored_names; }) {
+      law.stored(e, s, theta, rest_point, out);
+    } else {
+      static_assert(np == 0);
+      double sigma[ne];
+      out[0] = law.template stress<double>(e, nullptr, theta, rest_point, dt, sigma);
+    }
+  }
+
+  /// Adds the energies of a converged step. theta_old: the parameters at its start, strided as v.theta.
+  static void account(const Law& law, const ElementView& v, const double* theta_old, const double* u_old,
+                      const double* s_old, const double* u, const double* prepared, const double* s_new,
+                      TermEnergies& sum) {
+    double natural[3][max_rows], natural_old[3][max_rows];
+    gather<R>(v, u, natural);
+    gather<R>(v, u_old, natural_old);
+    for (int q = 0; q < v.num_points; ++q) {
+      double z[nz], z_old[nz], e[ne], e_old[ne], sigma[ne], b[ne][nz], parts[3] = {}, parts_old[3] = {};
+      point(v, natural, q, z);
+      point(v, natural_old, q, z_old);
+      Kin::strain(z, e);
+      Kin::strain(z_old, e_old);
+      const double *th = theta(v, q), *th_old = theta_old + static_cast<std::size_t>(q) * v.theta_stride;
+      const double *p = prepared + q * np, *so = s_old + q * ns, *sn = s_new + q * ns, *r = rest(v, q);
+      const double w = v.weight[q];
+      (void)law.template stress<double>(e, p, th, r, v.dt, sigma);
+      Kin::strain_gradient(z, b);
+      for (int c = 0; c < ne; ++c)
+        for (int i = 0; i < nz; ++i) sum.force_work += w * sigma[c] * b[c][i] * (z[i] - z_old[i]);
+      stored(law, e_old, so, th_old, r, v.dt, parts_old);
+      stored(law, e, sn, th, r, v.dt, parts);
+      for (std::size_t k = 0; k < stored_names.size(); ++k) {
+        sum.stored_before[k] += w * parts_old[k];
+        sum.stored[k] += w * parts[k];
+      }
+      if constexpr (requires { &Law::dissipated; })
+        sum.dissipated += w * law.dissipated(e_old, so, e, p, sn, th, r, v.dt);
+      if constexpr (requires { &Law::body_work; })
+        sum.body_work += w * law.body_work(e_old, e, p, th_old, th, r, v.dt);
     }
   }
 

@@ -59,6 +59,24 @@ struct PreStretchedLaw {
     }
   }
 
+  static constexpr auto stored_names = Base::stored_names;
+  void stored(const double* y, const double* history, const double* theta, const double* rest,
+              double* out) const {
+    double fp[6], yp[6];
+    stretch(theta, rest, fp);
+    pulled(fp, y, yp);
+    base.stored(yp, history, theta, nullptr, out);
+  }
+  double dissipated(const double* y_old, const double* history, const double* y, const double* prepared,
+                    const double* history_new, const double* theta, const double* rest, double dt) const
+      requires(ns > 0) {
+    double fp[6], yp_old[6], yp[6];
+    stretch(theta, rest, fp);
+    pulled(fp, y_old, yp_old);
+    pulled(fp, y, yp);
+    return base.dissipated(yp_old, history, yp, prepared, history_new, theta, nullptr, dt);
+  }
+
  private:
   /// F_p − I.
   template <class T>

@@ -15,6 +15,8 @@
 // − I [6]. Smooth   analytic for J > 0; the caller rejects J ≤ 0. Tests    tests/sim/terms/skin_law_test.cpp
 #pragma once
 
+#include <array>
+
 #include "sim/math/sym3.h"
 #include "sim/terms/damper.h"
 #include "sim/terms/skin_response.h"
@@ -61,6 +63,26 @@ T equilibrium(const T* y, const T* theta, double volume, T* n) {
   // (e^z − 1)/C → q as C → 0
   const T fung = value_of(stiffening) > 1e-12 ? expm1(z) / stiffening : q * (1.0 + 0.5 * z);
   return mu * fung + 0.5 * bulk * jm1 * jm1;
+}
+
+/// Stored equilibrium energy by part: distortion (Fung), volume.
+inline void equilibrium_parts(const double* y, const double* theta, double volume, double* out) {
+  double part[3], n[6];
+  for (int k = 0; k < 2; ++k) {
+    for (int c = 0; c < 3; ++c) part[c] = theta[c];
+    part[k == 0 ? SkinTheta::bulk : SkinTheta::mu_inf] = 0;
+    out[k] = equilibrium(y, part, volume, n);
+  }
+}
+
+/// Energy of the Maxwell spring at strain C = I + Y with history C^v = I + V.
+inline double maxwell_energy(const double* y, const double* v, double mu_m) {
+  double l[6], m[6], difference[6], x[6], unused[6];
+  cholesky_one_plus(v, l);
+  invert_lower(l, m);
+  for (int c = 0; c < 6; ++c) difference[c] = y[c] - v[c];
+  congruence_lower(m, difference, x);
+  return mu_m * half_log_deviator(x, unused);
 }
 
 /// sigma = ∂ψ/∂Y from S = sym(A C⁻¹), A a general matrix [3][3] that makes A C⁻¹ symmetric.
@@ -154,6 +176,19 @@ struct SkinLaw {
     isochoric(y, ybar);
     geometric_mean(prepared, ybar, damper(scheme, theta[SkinTheta::tau], dt).post, history);
   }
+
+  static constexpr std::array<const char*, 3> stored_names = {"fung", "volumetric", "maxwell"};
+  void stored(const double* y, const double* history, const double* theta, const double*, double* out) const {
+    equilibrium_parts(y, theta, volume, out);
+    out[2] = maxwell_energy(y, history, theta[SkinTheta::mu_m]);
+  }
+  /// What the Maxwell spring loses as it relaxes at the old strain before the step and at the new one after.
+  double dissipated(const double* y_old, const double* history, const double* y, const double* prepared,
+                    const double* history_new, const double* theta, const double*, double) const {
+    const double mu_m = theta[SkinTheta::mu_m];
+    return maxwell_energy(y_old, history, mu_m) - maxwell_energy(y_old, prepared, mu_m) +
+           maxwell_energy(y, prepared, mu_m) - maxwell_energy(y, history_new, mu_m);
+  }
 };
 
 /// Skin without a Maxwell branch: no history, half the work. θ = μ∞, C, K.
@@ -183,6 +218,11 @@ struct ElasticSkinLaw {
 
   template <class T>
   void update(const T*, const T*, const T*, const double*, double, T*) const {}
+
+  static constexpr std::array<const char*, 2> stored_names = {"fung", "volumetric"};
+  void stored(const double* y, const double*, const double* theta, const double*, double* out) const {
+    equilibrium_parts(y, theta, volume, out);
+  }
 };
 
 /// The volumetric term alone, for points of its own (fewer through the thickness): ψ = K/2 (J − 1)². θ = K.

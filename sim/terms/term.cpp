@@ -15,15 +15,6 @@ constexpr int round_up8(int n) {
 
 }  // namespace
 
-PathWeights path_weights(const std::vector<double>& times, double t) {
-  const int n = static_cast<int>(times.size());
-  if (n == 1 || t <= times.front()) return {{0, 0}, {1, 0}};
-  if (t >= times.back()) return {{n - 1, n - 1}, {1, 0}};
-  const int hi = static_cast<int>(std::upper_bound(times.begin(), times.end(), t) - times.begin());
-  const double s = (t - times[hi - 1]) / (times[hi] - times[hi - 1]);
-  return {{hi - 1, hi}, {1 - s, s}};
-}
-
 void Term::add_group(TermGroup g) {
   const int rows = kernels_->rows * g.num_points;
   require(static_cast<int>(g.theta.size()) == kernels_->ntheta, "Term: one slot per law parameter");
@@ -46,7 +37,8 @@ void Term::add_group(TermGroup g) {
   groups_.push_back(std::move(g));
 }
 
-std::vector<std::vector<double>> Term::load_theta(const StepInfo& step, const VectorXd& native) const {
+std::vector<std::vector<double>> Term::map_theta(const StepInfo& step, const VectorXd& native,
+                                                 double fixed_scale) const {
   const int nt = kernels_->ntheta;
   std::vector<std::vector<double>> result(groups_.size());
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
@@ -63,12 +55,13 @@ std::vector<std::vector<double>> Term::load_theta(const StepInfo& step, const Ve
           field_slot = s;
           break;
         case ThetaSlot::Kind::path_now:
-        case ThetaSlot::Kind::path_old: {
-          const PathWeights w =
-              path_weights(slot.knot_times, slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old);
-          row[s] = w.weight[0] * native[slot.offset + 3 * w.knot[0]] +
-                   w.weight[1] * native[slot.offset + 3 * w.knot[1]];
-        }
+        case ThetaSlot::Kind::path_old:
+          for (const KnotWeight& w :
+               slot.path->weights(slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old))
+            row[s] += w.weight * native[slot.offset + slot.stride * w.knot];
+          break;
+        case ThetaSlot::Kind::fixed:
+          row[s] = fixed_scale * slot.value;
       }
     }
     if (field_slot < 0) {
@@ -105,14 +98,15 @@ void Term::add_theta_transpose(const StepInfo& step, const std::vector<double>& 
                 g.field_weights[3 * q + k] * bar[q * nt + s];
         continue;
       }
+      if (slot.kind == ThetaSlot::Kind::fixed) continue;
       double sum = 0;
       for (std::size_t q = 0; q < points; ++q) sum += bar[q * nt + s];
       if (slot.kind == ThetaSlot::Kind::constant) {
         native_bar[slot.offset] += sum;
       } else {
-        const PathWeights w =
-            path_weights(slot.knot_times, slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old);
-        for (int k = 0; k < 2; ++k) native_bar[slot.offset + 3 * w.knot[k]] += w.weight[k] * sum;
+        for (const KnotWeight& w :
+             slot.path->weights(slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old))
+          native_bar[slot.offset + slot.stride * w.knot] += w.weight * sum;
       }
     }
   }

@@ -16,6 +16,7 @@
 
 #include "sim/core/types.h"
 #include "sim/terms/kernel_table.h"
+#include "sim/terms/path.h"
 
 namespace rhytid {
 
@@ -29,12 +30,14 @@ struct StepInfo {
   double dt() const { return t - t_old; }
 };
 
-/// Where one of a law's parameters comes from in the native vector.
+/// Where one of a law's parameters comes from: the native vector, or a number that is no parameter.
 struct ThetaSlot {
-  enum class Kind { constant, field, path_now, path_old };
+  enum class Kind { constant, field, path_now, path_old, fixed };
   Kind kind = Kind::constant;
-  int offset = 0;                  ///< of the constant, of column 0, or of the first knot's coordinate
-  std::vector<double> knot_times;  ///< path: s; knot k's coordinate is native[offset + 3k]
+  int offset = 0;  ///< of the constant, of column 0, or of the first knot's coordinate
+  std::shared_ptr<const KnotPath> path = nullptr;  ///< path_now, path_old
+  int stride = 3;                                  ///< knot k's coordinate is native[offset + stride·k]
+  double value = 0;                                ///< fixed
 };
 
 /// Elements of one shape and one parameter set; the arrays' shapes are those of ElementView with a leading
@@ -106,8 +109,14 @@ class Term {
     return *static_cast<const Law*>(law_.get());
   }
 
-  /// Parameters at the points from a native vector, or from a direction in it (the map is linear).
-  std::vector<std::vector<double>> load_theta(const StepInfo& step, const VectorXd& native) const;
+  /// Parameters at the points from a native vector.
+  std::vector<std::vector<double>> load_theta(const StepInfo& step, const VectorXd& native) const {
+    return map_theta(step, native, 1);
+  }
+  /// Their derivative along a direction in the native vector; the map is linear but for fixed slots.
+  std::vector<std::vector<double>> load_theta_direction(const StepInfo& step, const VectorXd& dnative) const {
+    return map_theta(step, dnative, 0);
+  }
   /// Transpose of load_theta: adds theta_bar [num_points][ntheta] to native_bar.
   void add_theta_transpose(const StepInfo& step, const std::vector<double>& theta_bar,
                            VectorXd& native_bar) const;
@@ -133,6 +142,10 @@ class Term {
   /// Which smooth piece of its law each point is on, [num_points], as numbered by kernels().regime_names;
   /// empty when the law is smooth everywhere.
   std::vector<signed char> regimes(const StepInfo& step, const TermStepData& data, const VectorXd& u) const;
+  /// Energies over a converged step that led from (u_old, s_old) to (u, s_new).
+  TermEnergies energies(const StepInfo& step, const TermStepData& data, const VectorXd& native,
+                        const VectorXd& u_old, const double* s_old, const VectorXd& u,
+                        const double* s_new) const;
   /// Largest s ≤ 1 with det(F + s dF) > 0 everywhere; +inf when the whole step is free.
   double feasible_step(const VectorXd& u, const VectorXd& d) const;
   /// Smallest J = det F over the points (prisms; +inf for surface terms).
@@ -161,6 +174,9 @@ class Term {
   const TermCounters& counters() const { return counters_; }
 
  private:
+  std::vector<std::vector<double>> map_theta(const StepInfo& step, const VectorXd& native,
+                                             double fixed_scale) const;
+
   std::string name_;
   const KernelTable* kernels_;
   std::shared_ptr<const void> law_;
@@ -168,13 +184,5 @@ class Term {
   int num_points_ = 0;
   mutable TermCounters counters_;
 };
-
-/// Value and knot weights of a piecewise linear path at time t: up to two (knot, weight) pairs, constant
-/// outside.
-struct PathWeights {
-  int knot[2];
-  double weight[2];
-};
-PathWeights path_weights(const std::vector<double>& knot_times, double t);
 
 }  // namespace rhytid

@@ -76,6 +76,26 @@ void Term::update(const StepInfo& step, const TermStepData& data, const VectorXd
   });
 }
 
+TermEnergies Term::energies(const StepInfo& step, const TermStepData& data, const VectorXd& native,
+                            const VectorXd& u_old, const double* s_old, const VectorXd& u,
+                            const double* s_new) const {
+  const StepInfo before{step.index, step.t_old, step.t_old};
+  const std::vector<std::vector<double>> theta_old = load_theta(before, native);
+  TermEnergies total;
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
+    std::vector<TermEnergies> sums(groups_[gi].num_elements);
+    for_elements(*this, gi, step, data, [&](const TermElement& e) {
+      const TermElement old = term_element(*kernels_, groups_[gi], e.index, step.dt(), theta_old[gi]);
+      kernels_->account(law_.get(), e.view, old.view.theta, e.gather(u_old).data(),
+                        s_old + e.point * kernels_->ns, e.gather(u).data(),
+                        data.prepared.data() + e.point * kernels_->np, s_new + e.point * kernels_->ns,
+                        &sums[e.index]);
+    });
+    for (const TermEnergies& one : sums) total.add(one);
+  }
+  return total;
+}
+
 std::vector<signed char> Term::regimes(const StepInfo& step, const TermStepData& data,
                                        const VectorXd& u) const {
   if (!kernels_->regime) return {};

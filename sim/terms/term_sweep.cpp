@@ -11,7 +11,7 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
   const int nt = kernels_->ntheta, ns = kernels_->ns;
   if (!df && (ns == 0 || !ds_new)) return;
   std::vector<std::vector<std::vector<double>>> dtheta;  // per direction, per group
-  for (const VectorXd* direction : dir.dnative) dtheta.push_back(load_theta(step, *direction));
+  for (const VectorXd* direction : dir.dnative) dtheta.push_back(load_theta_direction(step, *direction));
   // Parameter directions at the points of an element, [nq][nt][D]; empty without any.
   const auto element_dtheta = [&](std::size_t gi, const TermElement& e) {
     std::vector<double> dth;

@@ -181,6 +181,14 @@ double StepProblem::largest_feasible_step(const VectorXd& q, const VectorXd& d) 
   return smallest;
 }
 
+State StepProblem::relagged(const VectorXd& u) const {
+  State next = *old_;
+  for (std::size_t k = 0; k < data_.size(); ++k)
+    if (model_->terms[k].kernels().history_is_lag)
+      model_->terms[k].update(step_, data_[k], u, next.history.data() + model_->history_offset(k));
+  return next;
+}
+
 State StepProblem::advance(const VectorXd& u) const {
   State next{step_.t, u, VectorXd::Zero(static_cast<Eigen::Index>(model_->history_size())),
              (u - old_->u) / step_.dt()};

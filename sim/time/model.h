@@ -96,6 +96,9 @@ class StepProblem final : public Objective {
   /// is lower there (on drags it halves the iterations; where a finger turns or stops, the energy refuses
   /// it).
   VectorXd first_guess();
+  /// The old state with the lag (pressure and normal of friction) that the step would leave if it ended at u:
+  /// what another pass over the same step starts from.
+  State relagged(const VectorXd& u) const;
   /// The state after the step, given its converged displacement.
   State advance(const VectorXd& u) const;
 

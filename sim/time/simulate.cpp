@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "sim/core/error.h"
+#include "sim/time/step_passes.h"
 
 namespace rhytid {
 
@@ -13,20 +14,9 @@ void RunOptions::validate() const {
   require(frames >= 0, "RunOptions::frames must not be negative");
   require(frames_done >= 0, "RunOptions::frames_done must not be negative");
   require(substeps >= 1, "RunOptions::substeps must be at least 1");
+  require(lag_passes >= 1 && lag_passes <= 100, "RunOptions::lag_passes must be in 1..100");
   require(max_bisections >= 0 && max_bisections <= 20, "RunOptions::max_bisections must be in 0..20");
   minimiser.validate();
-}
-
-MinimiserReport solve_step(StepProblem& problem, const State& old, const MinimiserOptions& options,
-                           CholeskyFactor& factor, BlockMatrix& matrix, VectorXd& q,
-                           const IterationCallback& callback) {
-  const VectorXd held = problem.model().to_unknowns(old.u);
-  q = problem.first_guess();
-  const bool moved = q != held;
-  MinimiserReport report = minimise(problem, q, options, factor, matrix, callback);
-  if (report.converged() || report.status == MinimiserStatus::interrupted || !moved) return report;
-  q = held;
-  return minimise(problem, q, options, factor, matrix, callback);
 }
 
 namespace {
@@ -36,13 +26,10 @@ class Runner {
  public:
   Runner(const Model& model, const VectorXd& native, const RunOptions& options, const RunObserver& observer,
          const State* initial)
-      : model_(model),
-        native_(native),
-        options_(options),
+      : options_(options),
         observer_(observer),
         start_(std::chrono::steady_clock::now()),
-        matrix_(model.pattern()),
-        factor_(model.pattern()) {
+        solver_(model, native, options.minimiser, options.lag_passes) {
     run_.initial = initial ? *initial : model.rest_state();
     current_ = run_.initial;
   }
@@ -81,15 +68,12 @@ class Runner {
     while (!pending.empty()) {
       const auto [target, depth] = pending.back();
       const StepInfo step{static_cast<int>(run_.steps.size()), current_.time, target};
-      StepProblem problem(model_, native_, step, current_);
-      VectorXd q;
       IterationCallback callback;
       if (observer_.iteration)
         callback = [&, t = target](int it, double e, double r) {
           return observer_.iteration(frame, t, it, e, r);
         };
-      MinimiserReport report =
-          solve_step(problem, current_, options_.minimiser, factor_, matrix_, q, callback);
+      MinimiserReport report = solver_.solve(step, current_, nullptr, callback);
       bool softened = false;
       if (!report.converged()) {
         if (report.status != MinimiserStatus::interrupted && depth < options_.max_bisections) {
@@ -98,14 +82,9 @@ class Runner {
           continue;
         }
         if (report.status != MinimiserStatus::interrupted) {
-          VectorXd q_softened;
-          MinimiserReport last =
-              solve_step_softened(problem, options_.minimiser, factor_, matrix_, q_softened, callback);
+          MinimiserReport last = solver_.solve_softened(step, current_, callback);
           softened = last.converged();
-          if (softened || last.status == MinimiserStatus::interrupted) {
-            report = std::move(last);
-            q = std::move(q_softened);
-          }
+          if (softened || last.status == MinimiserStatus::interrupted) report = std::move(last);
         }
       }
       if (!report.converged()) {
@@ -119,24 +98,25 @@ class Runner {
         return false;
       }
       pending.pop_back();
-      State next = problem.advance(model_.to_displacement(q));
+      State next = solver_.problem().advance(solver_.displacement());
       StepRecord record{step, frame, depth - depth_used, softened, {}, std::move(report)};
+      if (options_.account_energies) record.energies = account_step(solver_.problem(), next);
       const bool frame_done = pending.empty() && ends_frame;
-      if (observer_.step) observer_.step({problem, next, record, frame_done});
+      if (observer_.step) observer_.step({solver_.problem(), next, record, frame_done});
       current_ = std::move(next);
-      if (options_.keep_states) record.state = current_;
+      if (options_.keep_states) {
+        record.state = current_;
+        record.earlier_passes = solver_.earlier_passes();
+      }
       run_.steps.push_back(std::move(record));
     }
     return true;
   }
 
-  const Model& model_;
-  const VectorXd& native_;
   const RunOptions& options_;
   const RunObserver& observer_;
   std::chrono::steady_clock::time_point start_;
-  BlockMatrix matrix_;
-  CholeskyFactor factor_;
+  StepSolver solver_;
   Trajectory run_;
   State current_;
 };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sim/solve/minimise.h"
+#include "sim/time/energy_account.h"
 #include "sim/time/model.h"
 
 namespace rhytid {
@@ -19,10 +20,12 @@ struct RunOptions {
   /// fully relaxed. Needed when the rest shape is under tension (pre-stretch). It is not taken when
   /// frames_done > 0.
   bool settle = false;
+  int lag_passes = 1;      ///< solves per step over the lag of friction (step_passes.h)
   int max_bisections = 4;  ///< a step that fails is halved at most this often
   MinimiserOptions minimiser;
-  bool keep_states = true;  ///< keep every step's state in the trajectory (needed for gradients)
-  void validate() const;    ///< throws ContractError naming the field
+  bool keep_states = true;        ///< keep every step's state in the trajectory (needed for gradients)
+  bool account_energies = false;  ///< fill StepRecord::energies (costs about one evaluation per step)
+  void validate() const;          ///< throws ContractError naming the field
 };
 
 /// Long against every relaxation time, s.
@@ -31,11 +34,15 @@ inline constexpr double kSettlingTime = 1e9;
 /// One converged step.
 struct StepRecord {
   StepInfo step;
-  int frame = 0;          ///< frame the step leads to (frame 0 is rest: only the settling step leads there)
-  int bisections = 0;     ///< how often the nominal step was halved
-  bool softened = false;  ///< its start came from softened penalties (the equations solved are the scene's)
-  State state;            ///< after the step (empty when states are not kept)
-  MinimiserReport report;
+  int frame = 0;           ///< frame the step leads to (frame 0 is rest: only the settling step leads there)
+  int bisections = 0;      ///< how often the nominal step was halved
+  bool softened = false;   ///< its start came from softened penalties (the equations solved are the scene's)
+  State state;             ///< after the step (empty when states are not kept)
+  MinimiserReport report;  ///< of the last pass, with the counts of all
+  /// Displacements at which the passes before the last ended (empty when states are not kept, or for one
+  /// pass).
+  std::vector<VectorXd> earlier_passes = {};
+  EnergyAccount energies = {};  ///< when RunOptions asks for it
 };
 
 struct Trajectory {
@@ -67,16 +74,10 @@ struct RunObserver {
       iteration;  ///< false = stop
 };
 
-/// Solves one step from problem.first_guess(), or once more from the old displacement if that does not
-/// converge. q is the solution if the report says converged, else where the minimiser stopped.
-[[nodiscard]] MinimiserReport solve_step(StepProblem& problem, const State& old,
-                                         const MinimiserOptions& options, CholeskyFactor& factor,
-                                         BlockMatrix& matrix, VectorXd& q,
-                                         const IterationCallback& callback = {});
-
 /// The last rung of the ladder: the step with all contact penalties softened to at most 1e-6 of the stiffest
 /// and back in steps of ten, each start from the solution before it, to a loose tolerance; then the step
-/// itself from there. Not converged without contacts. q and report as of solve_step.
+/// itself from there. Not converged without contacts. q is the solution if the report says
+/// converged.
 [[nodiscard]] MinimiserReport solve_step_softened(StepProblem& problem, const MinimiserOptions& options,
                                                   CholeskyFactor& factor, BlockMatrix& matrix, VectorXd& q,
                                                   const IterationCallback& callback = {});

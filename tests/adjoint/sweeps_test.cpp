@@ -95,6 +95,17 @@ INSTANTIATE_TEST_SUITE_P(
                                  "/skin/quadrature/volume=reduced", "/skin/layers/film/relaxing_fraction=0",
                                  "/time/frames=6"},
         std::vector<std::string>{"/ligaments/law=fung_quadratic", "/skin/quadrature/prism_degree=5"},
+        // A capsule that rolls and turns along a spline; an ellipsoid.
+        std::vector<std::string>{"/colliders/finger/shape=capsule", "/colliders/finger/length=4",
+                                 "/colliders/finger/axis=[0,1,0.02]",
+                                 "/colliders/finger/interpolation=spline",
+                                 "/colliders/finger/path/2/rotation=[0.1,0.6,0.4]"},
+        std::vector<std::string>{"/colliders/finger/shape=ellipsoid", "/colliders/finger/semi_axes=[7,4,5]",
+                                 "/colliders/finger/path/2/rotation=[0,-0.3,0.5]"},
+        // Every step solved again with its own normal force.
+        std::vector<std::string>{"/time/lag_passes=2"},
+        std::vector<std::string>{"/time/lag_passes=4", "/time/frames=5",
+                                 "/colliders/finger/friction/mollifier=quadratic"},
         // One layer relaxes, the other does not: two skin terms.
         std::vector<std::string>{"/skin/layers/film/relaxing_fraction=0", "/skin/rim=free"}));
 

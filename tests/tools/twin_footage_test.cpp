@@ -14,6 +14,7 @@
 #include "fitting/cameras.h"
 #include "fitting/observations.h"
 #include "sim/output/atomic_file.h"
+#include "sim/scene/collider_motion.h"
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
 #include "tools/render/finger.h"
@@ -139,7 +140,7 @@ TEST_F(TwinFootage, TruthTracksAreExactProjections) {
     EXPECT_NEAR(first->pixel.x(), std::round(first->pixel.x()), 1e-9);
     for (const fitting::Observation& o : track.observations) {
       const Vec3 x = surface.position(*point, o.frame);
-      const Vec3 tip = path_position(scene.colliders[0].path, o.time_s);
+      const Vec3 tip = ColliderMotion(scene.colliders[0]).at(o.time_s).centre;
       const Vec3 sight = (x - camera.centre()).normalized();
       const double clearance = sight.cross(tip - camera.centre()).norm() - 2;
       if (o.status == fitting::TrackStatus::ok) {

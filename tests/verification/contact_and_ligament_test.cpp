@@ -27,6 +27,7 @@ std::pair<double, double> indentation_error(int cells, int degree, double offset
   Term term("contact", contact_kernels(), ContactLaw{&sphere, 0.0});
   TermGroup g = surface_group(mesh, SkinSide::outer, triangle_rule(degree));
   for (int s = 0; s < 5; ++s) g.theta.push_back({ThetaSlot::Kind::constant, s, {}});
+  for (double q : {1., 0., 0., 0.}) g.theta.push_back({.kind = ThetaSlot::Kind::fixed, .value = q});
   term.add_group(std::move(g));
   VectorXd native(5), force = VectorXd::Zero(3 * mesh.num_nodes());
   native << kappa, 0, offset, 0.7 * offset, radius - depth;
@@ -58,6 +59,53 @@ TEST(Contact, SphereOnRigidPlane) {
   EXPECT_LE(worst_f[2], 1e-4);
   // C¹ edge of the contact: between h³ and h⁴ for the energy on average.
   EXPECT_GT(std::log2(worst_u[0] / worst_u[2]) / 2, 2.5);
+}
+
+/// Energy of a rigid sphere that slides over a flat mesh at a constant depth, over one cell: (largest −
+/// smallest)/mean. It should be constant.
+double sliding_ripple(int cells, int degree, double onset) {
+  const double radius = 8, depth = 0.5, side = 16, h = side / cells;
+  ExtrusionOptions o;
+  o.order = 1;
+  o.layers = {{1, 1, 1}};
+  const SkinMesh mesh = extrude(grid_surface(side, side, cells, cells, GridPattern::diagonal_plus), o);
+  const Sphere sphere(radius);
+  Term term("contact", contact_kernels(), ContactLaw{&sphere, onset});
+  TermGroup g = surface_group(mesh, SkinSide::outer, triangle_rule(degree));
+  for (int s = 0; s < 5; ++s) g.theta.push_back({ThetaSlot::Kind::constant, s, {}});
+  for (double q : {1., 0., 0., 0.}) g.theta.push_back({.kind = ThetaSlot::Kind::fixed, .value = q});
+  term.add_group(std::move(g));
+  double lowest = 1e300, highest = 0, sum = 0;
+  constexpr int places = 24;
+  for (int k = 0; k < places; ++k) {
+    VectorXd native(5);
+    native << 1, 0, h * k / places, 0.3 * h, radius - depth;
+    const VectorXd u = VectorXd::Zero(3 * mesh.num_nodes());
+    TermStepData data;
+    term.prepare({0, 0, 1}, native, u, nullptr, data);
+    const double energy = term.energy({0, 0, 1}, data, u, nullptr, nullptr);
+    lowest = std::min(lowest, energy);
+    highest = std::max(highest, energy);
+    sum += energy / places;
+  }
+  return (highest - lowest) / sum;
+}
+
+// The ripple is the quadrature's error where the contact ends. It falls with denser points and with a softer
+// onset (one more derivative), about like h³ to h⁴.
+TEST(Contact, RippleOfASlidingSphereFalls) {
+  double ripple[3][3];
+  const std::pair<int, double> kinds[] = {{6, 0.0}, {10, 0.0}, {10, 0.2}};
+  std::printf("ripple of a sliding sphere, h = 4, 2, 1 mm\n");
+  for (int kind = 0; kind < 3; ++kind) {
+    for (int level = 0; level < 3; ++level)
+      ripple[kind][level] = sliding_ripple(4 << level, kinds[kind].first, kinds[kind].second);
+    std::printf("  degree %2d, onset %.1f mm: %.1e %.1e %.1e\n", kinds[kind].first, kinds[kind].second,
+                ripple[kind][0], ripple[kind][1], ripple[kind][2]);
+    EXPECT_GT(std::log2(ripple[kind][0] / ripple[kind][2]) / 2, 2.5);
+  }
+  EXPECT_LT(ripple[1][2], ripple[0][2]);
+  EXPECT_LT(ripple[2][2], ripple[1][2]);
 }
 
 /// Uniform traction f on the inner face of a free patch, uniform b: rigid displacement d with k e^(b s)
@@ -115,7 +163,7 @@ TEST(Ligament, ThresholdAndLogarithm) {
 TEST(Friction, StickCreepAndSlidingThreshold) {
   const Plane plane(Vec3::UnitZ());
   const double mu = 0.4, pressure = 0.3, slip_speed = 2, dt = 1. / 24;
-  const double theta[9] = {1, 0, mu, 0, 0, 0, 0, 0, 0}, rest[4] = {},
+  const double theta[17] = {1, 0, mu, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, rest[4] = {},
                prepared[7] = {pressure, 0, 0, 1, 0, 0, 0};
   for (const auto& [mollifier, speeds] : {std::pair{Mollifier::quintic, std::array{0.2466, 0.5, 0.7534}},
                                           {Mollifier::quadratic, std::array{0.0513, 0.2929, 0.6838}}}) {

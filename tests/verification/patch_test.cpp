@@ -188,16 +188,20 @@ TEST(RigidMotion, SkinContactAndFrictionFollow) {
   for (int c = 0; c < mesh.num_columns; ++c)
     if (mesh.rest(mesh.node(c, mesh.num_levels - 1), 2) > top[2])
       top = mesh.rest.row(mesh.node(c, mesh.num_levels - 1)).transpose();
-  VectorXd native(5 + 12);
+  VectorXd native(5 + 24);
   const Vec3 centre = top + Vec3(0, 0, 1.2), centre_old = centre + Vec3(-0.1, 0.05, 0.02);
-  native << kNative, 0.7, 0.02, 0.5, centre_old, centre, centre;
+  const Eigen::Vector4d q_old(1, 0, 0, 0), q_now(1, 0.02, -0.01, 0.015);  // 0.05 rad in the step
+  native << kNative, 0.7, 0.02, 0.5, centre_old, centre, centre, q_old, q_now, q_now;
+  const auto knots = std::make_shared<KnotPath>(std::vector{0, kStep.t, 1.0});
   const auto surface_term = [&](bool friction) {
     TermGroup g = surface_group(mesh, SkinSide::outer, triangle_rule(10));
     for (int k = 0; k < (friction ? 3 : 2); ++k) g.theta.push_back({ThetaSlot::Kind::constant, 5 + k, {}});
     for (int old = 0; old < (friction ? 2 : 1); ++old)
       for (int a = 0; a < 3; ++a)
-        g.theta.push_back(
-            {old ? ThetaSlot::Kind::path_old : ThetaSlot::Kind::path_now, 8 + a, {0, kStep.t, 1}});
+        g.theta.push_back({old ? ThetaSlot::Kind::path_old : ThetaSlot::Kind::path_now, 8 + a, knots});
+    for (int old = 0; old < (friction ? 2 : 1); ++old)
+      for (int a = 0; a < 4; ++a)
+        g.theta.push_back({old ? ThetaSlot::Kind::path_old : ThetaSlot::Kind::path_now, 17 + a, knots, 4});
     Term t = friction
                  ? Term("friction", friction_kernels(), FrictionLaw{&finger, 1e-2, 2, Mollifier::quintic})
                  : Term("contact", contact_kernels(), ContactLaw{&finger, 1e-2});
@@ -224,6 +228,12 @@ TEST(RigidMotion, SkinContactAndFrictionFollow) {
     VectorXd native_moved = native;
     for (int k = 0; k < 3; ++k)
       native_moved.segment<3>(8 + 3 * k) = rot * native.segment<3>(8 + 3 * k) + shift;
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, axis.normalized()));
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector4d own = native.segment<4>(17 + 4 * k);
+      const Eigen::Quaterniond q = turn * Eigen::Quaterniond(own[0], own[1], own[2], own[3]);
+      native_moved.segment<4>(17 + 4 * k) << q.w(), q.x(), q.y(), q.z();
+    }
     for (const Term& term : terms) {
       SCOPED_TRACE(term.name() + ", angle " + std::to_string(angle));
       // The old history comes from a step that ends in u_old.

@@ -1,4 +1,5 @@
 #include "tools/render/finger.h"
+#include "sim/scene/collider_motion.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -52,22 +53,11 @@ Vec3 finger_direction(const Vec3& mean_normal, const fitting::Camera& camera) {
   return std::cos(elevation) * along.normalized() + std::sin(elevation) * mean_normal;
 }
 
-Vec3 path_position(const std::vector<PathKnot>& path, double time) {
-  if (path.empty()) return Vec3::Zero();
-  if (time <= path.front().time) return path.front().position;
-  for (size_t k = 1; k < path.size(); ++k) {
-    if (time > path[k].time) continue;
-    const double s = (time - path[k - 1].time) / (path[k].time - path[k - 1].time);
-    return (1 - s) * path[k - 1].position + s * path[k].position;
-  }
-  return path.back().position;
-}
-
 std::vector<Finger> fingers_at(const Scene& scene, double time, const Vec3& direction) {
   std::vector<Finger> fingers;
   for (const ColliderScene& collider : scene.colliders) {
     if (collider.shape != ShapeKind::sphere) continue;
-    const Vec3 tip = path_position(collider.path, time);
+    const Vec3 tip = ColliderMotion(collider).at(time).centre;
     fingers.push_back({tip, tip + 1.2 * collider.radius * direction, collider.radius});
   }
   return fingers;

@@ -25,15 +25,12 @@ struct Finger {
 /// Direction from tip to end: 62° above the skin, toward the lower edge of the picture.
 Vec3 finger_direction(const Vec3& mean_normal, const fitting::Camera& camera);
 
-/// The sphere colliders of a scene at a time (s), along their paths. Planes have no finger.
+/// The sphere colliders of a scene at a time (s), along their paths. Other shapes have no finger.
 std::vector<Finger> fingers_at(const Scene& scene, double time, const Vec3& direction);
 
 /// Outline of a finger in the picture, grown by `margin_px`: a convex polygon, px; empty when it is not
 /// wholly in front of the camera.
 std::vector<cv::Point2f> finger_outline(const Finger& finger, const fitting::Camera& camera,
                                         double margin_px);
-
-/// Position on a collider's path: linear between knots, constant outside.
-Vec3 path_position(const std::vector<PathKnot>& path, double time);
 
 }  // namespace rhytid::tools

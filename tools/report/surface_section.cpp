@@ -4,6 +4,7 @@
 
 #include "sim/output/picture.h"
 #include "sim/output/text.h"
+#include "sim/scene/collider_motion.h"
 #include "tools/render/finger.h"
 #include "tools/report/sections.h"
 #include "tools/report/skin_view.h"
@@ -17,7 +18,7 @@ std::vector<PictureSolid> glass_fingers(const Scene& scene, double time) {
   std::vector<PictureSolid> solids;
   for (const ColliderScene& collider : scene.colliders) {
     if (collider.shape != ShapeKind::sphere || collider.path.empty()) continue;
-    const Vec3 at = path_position(collider.path, time);
+    const Vec3 at = ColliderMotion(collider).at(time).centre;
     solids.push_back(capsule_solid(at, at, collider.radius));
     solids.back().opacity = 0.25;
   }

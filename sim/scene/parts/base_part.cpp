@@ -18,6 +18,8 @@ std::shared_ptr<const ImplicitShape> base_shape(const BaseScene& base, const Ski
     case ShapeKind::sphere:
       return std::make_shared<Sphere>(base.radius);
     case ShapeKind::imls:
+    case ShapeKind::capsule:  // of colliders only
+    case ShapeKind::ellipsoid:
       break;
   }
   ImlsOptions options;
@@ -73,6 +75,7 @@ void BasePart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
   }
   const int base = model.native_block("base").offset;
   for (int s = 0; s < 5; ++s) g.theta.push_back(constant_slot(base + s));
+  add_upright_slots(g);
   term.add_group(std::move(g));
   model.terms.push_back(std::move(term));
   features.push_back({"base contact", true,

@@ -1,6 +1,6 @@
 #include "sim/scene/parts/collider_part.h"
 
-#include "sim/surface/shapes.h"
+#include "sim/scene/collider_motion.h"
 #include "sim/terms/contact_law.h"
 #include "sim/terms/geometry.h"
 
@@ -8,35 +8,38 @@ namespace rhytid {
 
 namespace {
 
-double radius_of(const ColliderScene& c) {
-  return c.shape == ShapeKind::sphere ? c.radius : 0;
-}
-
-std::shared_ptr<const ImplicitShape> collider_shape(const ColliderScene& c) {
-  if (c.shape == ShapeKind::plane) return std::make_shared<Plane>(c.normal);
-  return std::make_shared<Sphere>(c.radius);
-}
-
 bool has_friction(const ColliderScene& c) {
   return c.friction && c.friction->coefficient > 0;
 }
 
-/// Slots of the collider's position now or at the start of the step; `offset` is the first knot's.
-void add_path_slots(const ColliderScene& c, ThetaSlot::Kind kind, int offset, TermGroup& g) {
-  std::vector<double> times;
-  for (const PathKnot& k : c.path) times.push_back(k.time);
-  for (int axis = 0; axis < 3; ++axis) g.theta.push_back({kind, offset + axis, times});
+int first_orientation(const ColliderScene& c) {
+  return 3 + 3 * static_cast<int>(c.path.size());
+}
+
+/// Slots of the centre now or at the start of the step; `offset` is the collider's native block.
+void add_centre_slots(const ColliderMotion& motion, ThetaSlot::Kind kind, int offset, TermGroup& g) {
+  for (int axis = 0; axis < 3; ++axis) g.theta.push_back({kind, offset + 3 + axis, motion.positions()});
+}
+
+/// The same of the orientation.
+void add_orientation_slots(const ColliderScene& c, const ColliderMotion& motion, ThetaSlot::Kind kind,
+                           int offset, TermGroup& g) {
+  if (!motion.orientations()) return add_upright_slots(g);
+  for (int part = 0; part < 4; ++part)
+    g.theta.push_back({kind, offset + first_orientation(c) + part, motion.orientations(), 4});
 }
 
 }  // namespace
 
 ColliderPart::ColliderPart(const Scene& scene) {
-  for (const ColliderScene& c : scene.colliders) built_radii_.push_back(radius_of(c));
+  for (const ColliderScene& c : scene.colliders) built_radii_.push_back(collider_radius(c));
 }
 
 void ColliderPart::add_native_blocks(const Scene& scene, Model& model) const {
-  for (const ColliderScene& c : scene.colliders)
-    add_native_block(model, "collider/" + c.name, 3 + 3 * static_cast<int>(c.path.size()), {0});
+  for (const ColliderScene& c : scene.colliders) {
+    const int orientations = 4 * static_cast<int>(ColliderMotion(c).quaternions().size());
+    add_native_block(model, "collider/" + c.name, first_orientation(c) + orientations, {0});
+  }
 }
 
 void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const {
@@ -46,11 +49,14 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
     model.shapes.push_back(collider_shape(c));
     const ImplicitShape* shape = model.shapes.back().get();
     const int base = model.native_block("collider/" + c.name).offset;
+    const ColliderMotion motion(c);
+    using enum ThetaSlot::Kind;
     {
       Term term("contact " + c.name, contact_kernels(), ContactLaw{shape, c.onset});
       TermGroup g = surface_group(model.mesh, SkinSide::outer, rule);
       g.theta = {constant_slot(base), constant_slot(base + 1)};
-      add_path_slots(c, ThetaSlot::Kind::path_now, base + 3, g);
+      add_centre_slots(motion, path_now, base, g);
+      add_orientation_slots(c, motion, path_now, base, g);
       term.add_group(std::move(g));
       model.terms.push_back(std::move(term));
     }
@@ -62,8 +68,8 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
                       c.friction->mollifier == "quadratic" ? Mollifier::quadratic : Mollifier::quintic});
       TermGroup g = surface_group(model.mesh, SkinSide::outer, rule);
       g.theta = {constant_slot(base), constant_slot(base + 1), constant_slot(base + 2)};
-      add_path_slots(c, ThetaSlot::Kind::path_now, base + 3, g);
-      add_path_slots(c, ThetaSlot::Kind::path_old, base + 3, g);
+      for (const ThetaSlot::Kind kind : {path_now, path_old}) add_centre_slots(motion, kind, base, g);
+      for (const ThetaSlot::Kind kind : {path_now, path_old}) add_orientation_slots(c, motion, kind, base, g);
       term.add_group(std::move(g));
       model.terms.push_back(std::move(term));
     }
@@ -81,10 +87,14 @@ void ColliderPart::set_native(const Scene& scene, const Model& model, VectorXd& 
     const ColliderScene& c = scene.colliders[k];
     const int at = model.native_block("collider/" + c.name).offset;
     native[at] = c.stiffness;
-    native[at + 1] = radius_of(c) - built_radii_[k];
+    native[at + 1] = collider_radius(c) - built_radii_[k];
     native[at + 2] = c.friction ? c.friction->coefficient : 0;
     for (std::size_t i = 0; i < c.path.size(); ++i)
       native.segment<3>(static_cast<Eigen::Index>(at + 3 + 3 * i)) = c.path[i].position;
+    const ColliderMotion motion(c);
+    for (std::size_t i = 0; i < motion.quaternions().size(); ++i)
+      native.segment<4>(static_cast<Eigen::Index>(at + first_orientation(c)) +
+                        4 * static_cast<Eigen::Index>(i)) = motion.quaternions()[i];
   }
 }
 

@@ -17,6 +17,11 @@ ThetaSlot constant_slot(int offset) {
   return {ThetaSlot::Kind::constant, offset, {}};
 }
 
+void add_upright_slots(TermGroup& group) {
+  for (const double component : {1.0, 0.0, 0.0, 0.0})
+    group.theta.push_back({.kind = ThetaSlot::Kind::fixed, .value = component});
+}
+
 MatrixX3 inner_rest_nodes(const SkinMesh& mesh) {
   MatrixX3 inner(mesh.num_columns, 3);
   for (int c = 0; c < mesh.num_columns; ++c) inner.row(c) = mesh.rest.row(mesh.node(c, 0));

@@ -46,6 +46,9 @@ void add_native_block(Model& model, std::string name, int size, std::vector<int>
 /// A slot of a law that reads one entry of the native vector.
 ThetaSlot constant_slot(int offset);
 
+/// Slots of the four components of a quaternion that says: not turned.
+void add_upright_slots(TermGroup& group);
+
 /// Positions of the inner-surface nodes at rest, mm, [num_columns][3].
 MatrixX3 inner_rest_nodes(const SkinMesh& mesh);
 

@@ -177,9 +177,22 @@ struct ShapeChoice {
 
 inline std::vector<ShapeChoice> shapes() {
   const Vec3 n = Vec3(0.2, -0.5, 0.8).normalized();
+  const Vec3 axes(5, 3, 7), foot = axes.cwiseProduct(axes).cwiseProduct(n);
   return {{"sphere", std::make_shared<Sphere>(5.0), 5 * n, n},
           {"plane", std::make_shared<Plane>(n), Vec3(n.unitOrthogonal()), n},
+          {"capsule", std::make_shared<Capsule>(5.0, 8.0, n.unitOrthogonal() + 0.1 * n),
+           5 * n + n.unitOrthogonal(), n},
+          {"ellipsoid", std::make_shared<Ellipsoid>(axes), foot / std::sqrt(n.dot(foot)), n},
           {"imls", bone(), Vec3(0.3, -0.4, 0), Vec3::UnitZ()}};
+}
+
+/// The orientation of a body as an unnormalised quaternion, up to `amount` rad from none.
+inline Eigen::Vector4d random_turn(Rng& rng, double amount) {
+  const Vec3 v = uniform(rng, 3, 0.5 * amount);
+  return 1.1 * Eigen::Vector4d(1, v[0], v[1], v[2]);
+}
+inline Mat3 rotation_of(const Eigen::Vector4d& q) {
+  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
 }
 
 inline std::vector<LawCase<ContactLaw>> contact_cases(const std::vector<ShapeChoice>& choices) {
@@ -192,13 +205,14 @@ inline std::vector<LawCase<ContactLaw>> contact_cases(const std::vector<ShapeCho
       for (double depth : {0.1, 0.35, 0.6}) {
         LawState s;
         const Vec3 centre = uniform(rng, 3, 3), x_rest = uniform(rng, 3, 2);
-        s.e = choice.surface_point - depth * choice.normal + centre - x_rest;
+        const Eigen::Vector4d turn = random_turn(rng, 1);
+        s.e = rotation_of(turn) * (choice.surface_point - depth * choice.normal) + centre - x_rest;
         s.e_old = s.e;
         s.history = VectorXd::Zero(0);
-        s.theta = VectorXd(5);
-        s.theta << 0.7, 0.01, centre;
-        s.theta_scale = VectorXd(5);
-        s.theta_scale << 0.7, 0.02, 0.02, 0.02, 0.02;
+        s.theta = VectorXd(9);
+        s.theta << 0.7, 0.01, centre, turn;
+        s.theta_scale = VectorXd::Constant(9, 0.02);
+        s.theta_scale[0] = 0.7;
         s.rest = VectorXd(4);
         s.rest << x_rest, 0.005;
         s.step = 0.02;
@@ -219,16 +233,21 @@ inline std::vector<LawCase<FrictionLaw>> friction_cases(const std::vector<ShapeC
                              {}};
       for (double slip : {0.02, 0.5, 3.0}) {  // deep stick, stick, slip
         LawState s;
-        const Vec3 centre = uniform(rng, 3, 3), x_rest = uniform(rng, 3, 2), n = choice.normal;
-        const Vec3 along = n.unitOrthogonal();
-        s.e = choice.surface_point - 0.4 * n + centre - x_rest;
+        const Vec3 centre = uniform(rng, 3, 3), x_rest = uniform(rng, 3, 2);
+        const Eigen::Vector4d turn = random_turn(rng, 1), turn_old = turn + 0.05 * random_turn(rng, 1);
+        const Mat3 rotation = rotation_of(turn);
+        const Vec3 n = rotation * choice.normal, along = n.unitOrthogonal();
+        const Vec3 from_centre = rotation * (choice.surface_point - 0.4 * choice.normal);
+        s.e = from_centre + centre - x_rest;
         const Vec3 centre_old = centre - Vec3(0.1, 0.05, 0);
-        s.e_old = s.e - (centre - centre_old) - slip * along - 0.3 * n;
+        // Where the point was: slipped back along the surface, then carried back with the body.
+        s.e_old = rotation_of(turn_old) * rotation.transpose() * (from_centre - slip * along - 0.3 * n) +
+                  centre_old - x_rest;
         s.history = VectorXd(4);
         s.history << 0.3, n;
-        s.theta = VectorXd(9);
-        s.theta << 0.7, 0.01, 0.4, centre, centre_old;
-        s.theta_scale = VectorXd::Constant(9, 0.02);
+        s.theta = VectorXd(17);
+        s.theta << 0.7, 0.01, 0.4, centre, centre_old, turn, turn_old;
+        s.theta_scale = VectorXd::Constant(17, 0.02);
         s.theta_scale[0] = 0.7;
         s.theta_scale[2] = 0.4;
         s.rest = VectorXd(4);

@@ -95,7 +95,9 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
   c.u_old = smooth_displacement(c.mesh, rng, 0.05);
   c.u = c.u_old + smooth_displacement(c.mesh, rng, 0.1);
   const auto constant = [](int at) { return ThetaSlot{ThetaSlot::Kind::constant, at, {}}; };
-  const auto path = [](ThetaSlot::Kind k, int axis) { return ThetaSlot{k, 3 + axis, {0.05, 0.12, 0.3}}; };
+  const auto knots = std::make_shared<KnotPath>(std::vector{0.05, 0.12, 0.3}, PathKind::spline);
+  const auto path = [&](ThetaSlot::Kind k, int axis) { return ThetaSlot{k, 3 + axis, knots}; };
+  const auto turn = [&](ThetaSlot::Kind k, int part) { return ThetaSlot{k, 12 + part, knots, 4}; };
   if (inner) {
     g.rest.clear();
     c.terms.emplace_back("ligaments", ligament_kernels(), LigamentLaw{});
@@ -112,17 +114,21 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
       middle +=
           Vec3(g.rest[4 * q], g.rest[4 * q + 1], g.rest[4 * q + 2]) / static_cast<double>(g.weight.size());
     const Vec3 centre = middle - choice.surface_point + 0.8 * choice.normal;
-    c.native = VectorXd(12);
+    c.native = VectorXd(24);
     c.native << 0.7, 0.01, 0.4, centre - Vec3(0.1, 0.1, 0), centre + Vec3(0.05, 0, 0),
-        centre + Vec3(0.3, 0.4, 0);
-    c.native_scale = VectorXd::Constant(12, 0.05);
+        centre + Vec3(0.3, 0.4, 0), Eigen::Vector4d(1, 0.01, 0, 0), Eigen::Vector4d(1, 0, 0.02, 0.01),
+        Eigen::Vector4d(1, 0.02, -0.03, 0.05);
+    c.native_scale = VectorXd::Constant(24, 0.05);
     c.native_scale[0] = 0.7;
     c.native_scale[2] = 0.4;
     g.theta = {constant(0), constant(1)};
     if (kind == "friction") g.theta.push_back(constant(2));
     for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_now, axis));
-    if (kind == "friction") {
+    if (kind == "friction")
       for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_old, axis));
+    for (int part = 0; part < 4; ++part) g.theta.push_back(turn(ThetaSlot::Kind::path_now, part));
+    if (kind == "friction") {
+      for (int part = 0; part < 4; ++part) g.theta.push_back(turn(ThetaSlot::Kind::path_old, part));
       c.terms.emplace_back("friction", friction_kernels(),
                            FrictionLaw{choice.shape.get(), 0.0, 3.0, mollifier});
     } else {

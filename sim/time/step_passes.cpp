@@ -1,0 +1,80 @@
+#include "sim/time/step_passes.h"
+
+#include <algorithm>
+
+#include "sim/core/error.h"
+#include "sim/time/simulate.h"
+
+namespace rhytid {
+
+StepSolver::StepSolver(const Model& model, const VectorXd& native, const MinimiserOptions& options,
+                       int passes)
+    : model_(&model),
+      native_(&native),
+      options_(options),
+      passes_(passes),
+      matrix_(model.pattern()),
+      factor_(model.pattern()) {
+  require(passes >= 1, "StepSolver: at least one pass");
+  const auto lags = [](const Term& term) { return term.kernels().history_is_lag; };
+  if (std::none_of(model.terms.begin(), model.terms.end(), lags)) passes_ = 1;
+}
+
+MinimiserReport StepSolver::solve_pass(VectorXd& q, const VectorXd& held, const IterationCallback& callback) {
+  const bool moved = q != held;
+  MinimiserReport report = minimise(*problem_, q, options_, factor_, matrix_, callback);
+  if (report.converged() || report.status == MinimiserStatus::interrupted || !moved) return report;
+  q = held;
+  return minimise(*problem_, q, options_, factor_, matrix_, callback);
+}
+
+MinimiserReport StepSolver::solve(const StepInfo& step, const State& old, const VectorXd* start,
+                                  const IterationCallback& callback) {
+  problem_.emplace(*model_, *native_, step, old);
+  VectorXd q = start ? model_->to_unknowns(*start) : problem_->first_guess();
+  const VectorXd held = start ? q : model_->to_unknowns(old.u);
+  MinimiserReport first = solve_pass(q, held, callback);
+  return solve_later_passes(step, std::move(first), std::move(q), held, callback);
+}
+
+MinimiserReport StepSolver::solve_softened(const StepInfo& step, const State& old,
+                                           const IterationCallback& callback) {
+  problem_.emplace(*model_, *native_, step, old);
+  VectorXd q;
+  MinimiserReport first = solve_step_softened(*problem_, options_, factor_, matrix_, q, callback);
+  return solve_later_passes(step, std::move(first), q, q, callback);
+}
+
+MinimiserReport StepSolver::solve_later_passes(const StepInfo& step, MinimiserReport first, VectorXd q,
+                                               const VectorXd& held, const IterationCallback& callback) {
+  earlier_.clear();
+  MinimiserReport total = std::move(first);
+  for (int pass = 1;; ++pass) {
+    u_ = model_->to_displacement(q);
+    if (!total.converged() || pass >= passes_) return total;
+    State next = problem_->relagged(u_);
+    earlier_.push_back(u_);
+    problem_.reset();  // it refers to lagged_
+    lagged_ = std::move(next);
+    problem_.emplace(*model_, *native_, step, lagged_);
+    MinimiserReport report = solve_pass(q, held, callback);
+    report.iterations += total.iterations;
+    report.lbfgs_iterations += total.lbfgs_iterations;
+    report.evaluations += total.evaluations;
+    report.factorisations += total.factorisations;
+    report.failed_factorisations += total.failed_factorisations;
+    report.negative_curvature_exits += total.negative_curvature_exits;
+    total = std::move(report);
+  }
+}
+
+StepPasses::StepPasses(const Model& model, const VectorXd& native, const StepInfo& step, const State& old,
+                       const std::vector<VectorXd>& earlier) {
+  problems_.push_back(std::make_unique<StepProblem>(model, native, step, old));
+  for (const VectorXd& u : earlier) {
+    states_.push_back(std::make_unique<State>(problems_.back()->relagged(u)));
+    problems_.push_back(std::make_unique<StepProblem>(model, native, step, *states_.back()));
+  }
+}
+
+}  // namespace rhytid
