@@ -92,7 +92,7 @@ TEST(Friction, BlockOnAnInclineCreepsBelowTheThresholdAndSlidesBeyond) {
 // force rises with the shear until it is μ N, and stays.
 TEST(Friction, SpringBlockSticksThenSlidesAtMuN) {
   Scene scene =
-      slab_under_plane("quintic", {{0, Vec3(0, 0, 0)}, {0.25, Vec3(0, 0, -0.1)}, {1.25, Vec3(0.6, 0, -0.1)}});
+      slab_under_plane("quintic", {{0, Vec3(0, 0, 0)}, {0.25, Vec3(0, 0, -0.1)}, {2.25, Vec3(1.2, 0, -0.1)}});
   scene.colliders[0].friction->slip_speed = 0.02;  // against 0.6 mm/s of the plane
   scene.skin.layers[0].relaxing_fraction = 0;      // N stays what the press made it
   const SceneModel m(scene);
@@ -105,7 +105,7 @@ TEST(Friction, SpringBlockSticksThenSlidesAtMuN) {
     for (int a = 0; a < 3; ++a) held.push_back(3 * mesh.node(c, 0) + a);
   const double dt = 1. / 24;
   std::vector<double> ratio, slip;
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < 54; ++i) {
     const StepInfo info{i, i * dt, (i + 1) * dt};
     StepProblem step(model, native, info, state);
     LoadedProblem problem(step, held, VectorXd::Zero(3 * model.num_nodes()));
@@ -127,13 +127,13 @@ TEST(Friction, SpringBlockSticksThenSlidesAtMuN) {
     slip.push_back(pressed > 0 ? static_cast<double>(sliding) / pressed : 0);
     state = step.advance(q);
   }
-  std::printf("spring block: T/(μN) at steps 8, 10, 14, 29: %.4f %.4f %.4f %.8f\n", ratio[8] / kFriction,
-              ratio[10] / kFriction, ratio[14] / kFriction, ratio[29] / kFriction);
-  EXPECT_NEAR(ratio[29], kFriction, 1e-7);
-  EXPECT_EQ(slip[29], 1);
+  std::printf("spring block: T/(μN) at steps 8, 10, 14, 53: %.4f %.4f %.4f %.8f\n", ratio[8] / kFriction,
+              ratio[10] / kFriction, ratio[14] / kFriction, ratio[53] / kFriction);
+  EXPECT_NEAR(ratio[53], kFriction, 1e-4 * kFriction);
+  EXPECT_EQ(slip[53], 1);
   EXPECT_LT(slip[7], 0.5);
   EXPECT_LT(ratio[8], 0.9 * kFriction);
-  for (int i = 7; i < 29; ++i) {
+  for (int i = 7; i < 53; ++i) {
     EXPECT_LE(ratio[i], kFriction * (1 + 5e-3)) << i;  // the lag of N
     EXPECT_GE(ratio[i + 1], ratio[i] - 5e-3 * kFriction) << i;
   }
