@@ -192,7 +192,7 @@ TEST(RigidMotion, SkinContactAndFrictionFollow) {
   const Vec3 centre = top + Vec3(0, 0, 1.2), centre_old = centre + Vec3(-0.1, 0.05, 0.02);
   const Eigen::Vector4d q_old(1, 0, 0, 0), q_now(1, 0.02, -0.01, 0.015);  // 0.05 rad in the step
   native << kNative, 0.7, 0.02, 0.5, centre_old, centre, centre, q_old, q_now, q_now;
-  const auto knots = std::make_shared<KnotPath>(std::vector{0, kStep.t, 1.0});
+  const auto knots = std::make_shared<KnotPath>(std::vector{0.0, kStep.t, 1.0});
   const auto surface_term = [&](bool friction) {
     TermGroup g = surface_group(mesh, SkinSide::outer, triangle_rule(10));
     for (int k = 0; k < (friction ? 3 : 2); ++k) g.theta.push_back({ThetaSlot::Kind::constant, 5 + k, {}});
