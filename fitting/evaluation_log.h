@@ -39,7 +39,7 @@ class EvaluationLog {
   struct Record {
     std::string failure;
     double seconds = 0;  ///< that it took when it was computed
-    MatrixXd values;
+    MatrixXd values = {};
   };
 
   /// Opens the log in `folder`, or begins one. `anew` sets an older one aside even when it matches. Throws

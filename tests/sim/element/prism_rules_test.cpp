@@ -10,6 +10,7 @@
 
 #include "sim/core/error.h"
 #include "sim/element/quadrature.h"
+#include "tests/support/paths.h"
 #include "tools/rules/prism_rule_search.h"
 
 namespace rhytid {
@@ -106,7 +107,7 @@ TEST(PrismRules, TensorRuleIsTheProduct) {
 }
 
 TEST(PrismRules, TableHoldsThemToThirtyDigits) {
-  std::ifstream file(RHYTID_SOURCE_DIR "/data/quadrature/prism_rules.csv");
+  std::ifstream file(source_dir() + "/data/quadrature/prism_rules.csv");
   std::string line;
   std::getline(file, line);
   EXPECT_EQ(line, "degree,name,u,v,w,weight");
