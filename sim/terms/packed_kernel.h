@@ -25,12 +25,12 @@ struct PackedKernel {
 
   /// Points q … q + kLanes − 1 of an element; past its end the last point is repeated with weight 0.
   struct Pack {
-    Lanes h[nz], y[ne], jacobian[9], weight;
-    Lanes prepared[at_least_one(np)], theta[nt], constants[at_least_one(nc)];
+    Lanes h[nz], y[ne], jacobian[9] = {}, weight = {};
+    Lanes prepared[at_least_one(np)] = {}, theta[nt] = {}, constants[at_least_one(nc)] = {};
 
     Pack(const Law& law, const ElementView& v, const double (*natural)[kMaxRows], const double* prepared_all,
          const double* shared_constants, int first) {
-      Lanes local[nz];
+      Lanes local[nz] = {};
       for (int k = 0; k < kLanes; ++k) {
         const bool inside = first + k < v.num_points;
         const int q = inside ? first + k : v.num_points - 1;
