@@ -26,6 +26,7 @@ Trajectory resimulate(const Model& model, const VectorXd& native, const Trajecto
       report = solver.solve(known.step, current, &from);
     }
     if (!report.converged()) report = solver.solve(known.step, current);
+    if (!report.converged() && known.softened) report = solver.solve_softened(known.step, current);
     if (!report.converged()) {
       run.failure = "step " + std::to_string(i) + ": " + name(report.status) + " after " +
                     std::to_string(report.iterations) + " iterations";

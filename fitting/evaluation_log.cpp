@@ -107,9 +107,9 @@ EvaluationLog::EvaluationLog(std::string folder, const FitIdentity& identity, bo
 }
 
 void EvaluationLog::move_old(const std::string& reason) {
-  const std::string old = folder_ + ".old";
   std::error_code error;
-  fs::remove_all(old, error);
+  std::string old = folder_ + ".old";
+  for (int k = 2; fs::exists(old, error); ++k) old = folder_ + ".old" + std::to_string(k);
   fs::rename(folder_, old, error);
   if (error)
     throw InputError(folder_, "a log of another fit that cannot be moved (" + error.message() + ")",
@@ -143,7 +143,10 @@ std::optional<EvaluationLog::Record> EvaluationLog::find(Kind kind, const Vector
   if (!fs::exists(found->second, error)) return std::nullopt;
   const std::string content = read_file(found->second);
   std::optional<Header> header = read_header(content);
-  if (!header || header->parameters != t.size()) return std::nullopt;
+  // The file is asked again what it holds: another process may have written over it.
+  if (!header || header->kind != name_of(kind) || header->parameters != t.size() ||
+      content.compare(header->data, found->first.second.size(), found->first.second) != 0)
+    return std::nullopt;
   Record record = std::move(header->record);
   record.values.resize(header->rows, header->columns);
   if (record.values.size() > 0)

@@ -1,45 +1,17 @@
 // The digests by which a log of evaluations knows its own fit.
-#include <cstdint>
-#include <cstdio>
 #include <filesystem>
 
 #include "fitting/evaluation_log.h"
 #include "fitting/fit.h"
 #include "sim/core/build_info.h"
+#include "sim/core/digest.h"
 #include "sim/scene/load.h"
 #include "sim/solve/blas_info.h"
 #include "sim/terms/kernel_table.h"
+#include "sim/time/model_digest.h"
 
 namespace rhytid::fitting {
 namespace {
-
-/// FNV-1a with 64 bits: tells versions of the same thing apart, no defence against forgery.
-class Digest {
- public:
-  void bytes(const void* data, std::size_t size) {
-    const auto* byte = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i) state_ = (state_ ^ byte[i]) * 0x100000001b3ull;
-  }
-  void text(const std::string& s) {
-    number(static_cast<double>(s.size()));
-    bytes(s.data(), s.size());
-  }
-  void number(double x) { bytes(&x, sizeof(x)); }
-  template <class Matrix>
-  void matrix(const Matrix& m) {
-    number(static_cast<double>(m.rows()));
-    for (Eigen::Index i = 0; i < m.rows(); ++i)
-      for (Eigen::Index j = 0; j < m.cols(); ++j) number(m(i, j));
-  }
-  std::string hex() const {
-    char out[24];
-    std::snprintf(out, sizeof(out), "%016llx", static_cast<unsigned long long>(state_));
-    return out;
-  }
-
- private:
-  std::uint64_t state_ = 0xcbf29ce484222325ull;
-};
 
 std::string program_digest() {
   Digest d;
@@ -63,10 +35,7 @@ std::string scene_digest(const Scene& scene, const FitProblem& problem) {
   for (const char* key : {"name", "description", "output"}) json.erase(key);
   Digest d;
   d.text(json.dump());
-  // The surface may come from a file, which can change under the same name.
-  const SkinMesh& mesh = problem.scene_model().model().mesh;
-  d.matrix(mesh.rest);
-  for (const int column : mesh.face_columns) d.number(column);
+  d.text(content_digest(problem.scene_model().model()));  // files may change under the same name
   return d.hex();
 }
 

@@ -24,6 +24,19 @@ void check_times(const Track& track, double frame_rate) {
                            std::to_string(frame_rate) + " 1/s)");
 }
 
+/// The surface that frame 0 shows: at rest, or settled under its pre-stretch (initial parameters).
+SkinMesh first_frame_mesh(const SceneModel& model, const RunOptions& options) {
+  SkinMesh mesh = model.model().mesh;
+  if (!options.settle) return mesh;
+  RunOptions settle_only = options;
+  settle_only.frames = 0;
+  const Trajectory settled = simulate(model.model(), model.native(), settle_only);
+  if (!settled.complete) throw InputError("fit: /skin/pre_stretch", settled.failure, "a scene that settles");
+  const VectorXd& u = settled.at_frame(0).u;
+  for (int n = 0; n < mesh.num_nodes(); ++n) mesh.rest.row(n) += u.segment<3>(3 * n).transpose();
+  return mesh;
+}
+
 }  // namespace
 
 FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& camera, const TrackSet& tracks)
@@ -33,7 +46,7 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& cam
   options_.keep_states = true;
   options_.minimiser.polish = true;  // gradients are then exact to the square of the tolerance
   if (options_.frames < 1) throw InputError("fit: frames", "0", "a scene with at least one frame after rest");
-  registration_ = register_tracks(tracks, camera, model_.model().mesh, fit.rim_margin);
+  registration_ = register_tracks(tracks, camera, first_frame_mesh(model_, options_), fit.rim_margin);
   choose_observations(tracks, fit, camera.name);
 
   std::vector<adjoint::MaterialPoint> points;

@@ -7,6 +7,7 @@
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "sim/time/model_digest.h"
 
 namespace rhytid::tools {
 namespace {
@@ -19,11 +20,11 @@ std::string bytes(const double* values, std::size_t count) {
 
 }  // namespace
 
-std::string run_identity(const Scene& scene, const State& state) {
+std::string run_identity(const Scene& scene, const Model& model) {
   nlohmann::json json = scene_to_json(scene);
   for (const char* key : {"name", "description", "output"}) json.erase(key);
   json["time"].erase("frames");
-  return nlohmann::json{{"scene", json}, {"u", state.u.size()}, {"history", state.history.size()}}.dump();
+  return nlohmann::json{{"scene", json}, {"content", content_digest(model)}}.dump();
 }
 
 void write_checkpoint(const std::string& path, const RunCheckpoint& c) {

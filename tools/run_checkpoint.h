@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "sim/scene/scene.h"
-#include "sim/time/state.h"
+#include "sim/time/model.h"
 
 namespace rhytid::tools {
 
@@ -18,8 +18,8 @@ struct RunCheckpoint {
 };
 
 /// Text that is equal for runs whose states may be exchanged: the scene without name, output settings and
-/// number of frames, and the sizes of the state.
-std::string run_identity(const Scene& scene, const State& state);
+/// number of frames, and the numbers of the model that it and its files made.
+std::string run_identity(const Scene& scene, const Model& model);
 
 /// Atomic; doubles are kept bit by bit in this machine's byte order. Throws InputError naming the path.
 void write_checkpoint(const std::string& path, const RunCheckpoint& checkpoint);

@@ -34,7 +34,7 @@ class ForwardRun {
         frames_(scene_model_, folder_, options),
         table_(scene_model_.model()),
         record_(folder_ + "/run.json", scene_model_, context),
-        identity_(run_identity(scene_model_.scene(), scene_model_.model().rest_state())) {}
+        identity_(run_identity(scene_model_.scene(), scene_model_.model())) {}
 
   ExitCode go(bool resume) {
     const Scene& scene = scene_model_.scene();
@@ -98,6 +98,7 @@ class ForwardRun {
     }
     for (int frame = 0; frame <= checkpoint->frame; ++frame)
       if (is_written(frame)) frames_.restore(frame, frame == 0 ? 0 : 1 / time.frame_rate * frame);
+    options.settle = false;  // the checkpoint lies behind it
     options.frames_done = record_.frames_done = record_.resumed_from = checkpoint->frame;
     start = std::move(checkpoint->state);
     context_.progress.note("resumed after frame " + std::to_string(options.frames_done));

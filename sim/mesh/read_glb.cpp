@@ -45,13 +45,15 @@ class GlbReader {
 
   TriangleSurface read() {
     read_chunks();
-    if (root_.contains("extensionsRequired") && !root_["extensionsRequired"].empty())
-      fail("needs the extension " + root_["extensionsRequired"].dump() +
+    std::string extensions;
+    if (root_.contains("extensionsRequired"))
+      for (const auto& name : root_["extensionsRequired"])
+        if (name.is_string()) extensions += " " + name.get<std::string>();
+    if (!extensions.empty())
+      fail("needs the extension" + extensions +
            ", which is not read; export without compression and quantisation");
     walk_scene();
-    TriangleSurface surface = builder_.finish("binary glTF 2.0");
-    join_coincident_vertices(surface);
-    return surface;
+    return builder_.finish("binary glTF 2.0");
   }
 
  private:

@@ -59,7 +59,9 @@ TriangleSurface scene_surface(const SurfaceScene& s) {
   TriangleSurface mesh = read_surface(s.file, s.mm_per_unit > 0 ? s.mm_per_unit : 1);
   drop_unused_vertices(mesh);
   if (s.mm_per_unit == 0) refuse_doubtful_unit(mesh);
-  if (s.coincident == "join") join_coincident_vertices(mesh);
+  // Texture seams double vertices in glTF, which knows no other way.
+  const bool has_seams = mesh.format.starts_with("binary glTF");
+  if (s.coincident == "join" || (s.coincident == "auto" && has_seams)) join_coincident_vertices(mesh);
   mesh = cropped(std::move(mesh), s);
   if (s.coincident == "auto") refuse_coincident_vertices(mesh);
   return mesh;

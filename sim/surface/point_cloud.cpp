@@ -211,6 +211,7 @@ class CloudReader {
       column[k] = static_cast<int>(found - element.properties.begin());
     }
     std::vector<double> row(element.properties.size());
+    if (row.empty()) return;  // nothing to skip, however many there are
     for (long i = 0; i < element.count; ++i) {
       if (format == "ascii") {
         read_ply_line(row);
@@ -269,6 +270,8 @@ class CloudReader {
       const double length = normal.stableNorm();
       if (!(length > 0)) throw InputError(which, "no normal", "a normal of any length but zero");
       cloud.points.row(i) = (mm_per_unit_ * point).transpose();
+      if (!cloud.points.row(i).allFinite())
+        throw InputError(which, "a coordinate that is not finite in mm", "a smaller mm_per_unit");
       cloud.normals.row(i) = (normal / length).transpose();
       distinct = distinct || point != points_[0];
     }

@@ -40,6 +40,22 @@ int column_of_vertex(const SkinMesh& mesh, int vertex) {
   return exists ? mesh.vertex_columns[local] : -1;
 }
 
+/// Mean over the patch, mm; of a thickness map only what is on the patch counts.
+double skin_thickness(const Scene& scene, const SkinMesh& mesh) {
+  double thickness = 0;
+  bool is_mapped = false;
+  for (const LayerScene& layer : scene.skin.layers) {
+    thickness += layer.thickness;
+    is_mapped = is_mapped || !layer.thickness_by_vertex.empty();
+  }
+  if (!is_mapped) return thickness;
+  const int last = mesh.num_levels - 1;
+  double sum = 0;
+  for (int c = 0; c < mesh.num_columns; ++c)
+    sum += (mesh.rest.row(c * mesh.num_levels + last) - mesh.rest.row(c * mesh.num_levels)).norm();
+  return sum / mesh.num_columns;
+}
+
 }  // namespace
 
 /// Most recently used first.
@@ -124,10 +140,9 @@ VectorXd LigamentPart::map(const Scene& scene) const {
 
 void LigamentPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
   const int at = model.native_block("ligaments").offset;
-  double thickness = 0;
-  for (const LayerScene& l : scene.skin.layers) thickness += l.thickness;
   native[at] = scene.ligaments->stiffness;
-  native[at + 1] = scene.ligaments->smoothing > 0 ? scene.ligaments->smoothing : 1e-2 * thickness;
+  native[at + 1] =
+      scene.ligaments->smoothing > 0 ? scene.ligaments->smoothing : 1e-2 * skin_thickness(scene, model.mesh);
   const NativeBlock& b = model.native_block("ligaments/b");
   native.segment(b.offset, b.size) = map(scene);
 }
