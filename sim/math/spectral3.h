@@ -66,7 +66,7 @@ void cholesky_one_plus_packed(const V* y, V* l) {
 template <class V>
 V log_difference(const V& a, const V& b, const V& log_a, const V& log_b) {
   const V sum = a + b, difference = a - b, z = difference / sum, s = z * z;
-  // 2 atanh(z)/z = 2 (1 + s/3 + s²/5 + ...); the first term left out is s¹⁰/21, 5e-19 at the switch.
+  // 2 atanh(z)/z = 2 (1 + s/3 + s²/5 + ...); the first term left out is s¹⁰/21, 5e-20 at the switch.
   V series = broadcast<V>(1. / 19);
   for (int k = 17; k >= 1; k -= 2) series = series * s + 1. / k;
   return select(s < 0.016, 2.0 * series / sum, (log_a - log_b) / difference);
