@@ -6,8 +6,8 @@
 //   FOLDER/run-0001.bin, tangent-0001.bin, adjoint-0001.bin, ...
 //           a line of JSON, then t and the values as doubles in this machine's byte order
 //
-// A file appears whole or not at all. A log of another identity is set aside as FOLDER.old (.old2, …), never mixed in.
-// Tests: tests/fitting/resume_test.cpp
+// A file appears whole or not at all. A log of another identity is set aside as FOLDER.old (.old2, …), never
+// mixed in. Tests: tests/fitting/resume_test.cpp
 #pragma once
 
 #include <functional>
