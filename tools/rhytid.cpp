@@ -4,9 +4,11 @@
 #include "fitting/case_rules.h"
 #include "tools/all_verbs.h"
 #include "tools/environment.h"
+#include "tools/threads.h"
 
 int main(int argc, char** argv) {
   using namespace rhytid::tools;
+  let_waiting_threads_sleep(argc, argv);
   Program program;
   program.name = "rhytid";
   program.description =

@@ -2,10 +2,12 @@
 #include <iostream>
 
 #include "tools/forward_verbs.h"
+#include "tools/threads.h"
 #include "tools/verb.h"
 
 int main(int argc, char** argv) {
   using namespace rhytid::tools;
+  let_waiting_threads_sleep(argc, argv);
   Program program;
   program.name = "rhytid-forward";
   program.description = "Rhytid, forward only: simulates skin that is pushed and dragged over bone.";

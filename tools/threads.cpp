@@ -1,6 +1,10 @@
 #include "tools/threads.h"
 
 #include <omp.h>
+#include <sys/auxv.h>
+#include <unistd.h>
+
+#include <cstdlib>
 
 #include "sim/core/parallel.h"
 
@@ -16,6 +20,15 @@ void use_threads(int n) {
   set_num_threads(n);
   omp_set_num_threads(n);  // Eigen and other users of OpenMP
   openblas_set_num_threads(n);
+}
+
+void let_waiting_threads_sleep(int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;  // --help, --version
+  if (std::getenv("OMP_WAIT_POLICY") || std::getenv("GOMP_SPINCOUNT")) return;
+  // No loader of its own: /proc/self/exe is then the loader, not this program.
+  if (getauxval(AT_BASE) == 0) return;
+  if (setenv("OMP_WAIT_POLICY", "passive", 0) != 0) return;
+  execv("/proc/self/exe", argv);
 }
 
 }  // namespace rhytid::tools

@@ -79,7 +79,10 @@ ReportData gather_report_data(const std::string& folder) {
 std::optional<cv::Mat> footage_frame(const std::string& footage, int frame) {
   if (footage.empty() || frame < 0) return std::nullopt;
   try {
-    fitting::FrameSource source({.path = footage, .first = frame, .last = frame});
+    fitting::FrameSourceOptions one_frame;
+    one_frame.path = footage;
+    one_frame.first = one_frame.last = frame;
+    fitting::FrameSource source(one_frame);
     if (auto found = source.next()) return found->colour.clone();
   } catch (const InputError&) {
     // A report goes without the picture; the caller says so.
