@@ -9,6 +9,8 @@ namespace rhytid {
 namespace {
 constexpr double kArmijo = 1e-4;
 constexpr double kSmallestStep = 1e-8;  // relative to the first
+constexpr double kStillFalling = 0.7;   // of the first slope; a true Newton step ends at none
+constexpr int kDoublings = 20;
 }  // namespace
 
 bool Iterate::finite() const {
@@ -54,6 +56,24 @@ LineSearchResult line_search(Objective& objective, const Iterate& at, const Vect
     step = std::isfinite(parabola) ? std::clamp(parabola, 0.1 * step, 0.5 * step) : 0.3 * step;
   }
   return result;
+}
+
+void lengthen(Objective& objective, const Iterate& at, const VectorXd& direction, double slope,
+              LineSearchResult& found) {
+  const double limit = 0.9 * objective.largest_feasible_step(at.q, direction);
+  for (int doubling = 0; doubling < kDoublings && 2 * found.step <= limit; ++doubling) {
+    if (found.next.gradient.dot(direction) > kStillFalling * slope) return;
+    Iterate trial = evaluate(objective, at.q + 2 * found.step * direction);
+    ++found.evaluations;
+    if (!trial.finite() || !(trial.energy < found.next.energy)) {
+      // The objective keeps data of its last evaluation (force scale): leave it at the point returned.
+      objective.energy(found.next.q, &found.next.gradient);
+      ++found.evaluations;
+      return;
+    }
+    found.next = std::move(trial);
+    found.step *= 2;
+  }
 }
 
 }  // namespace rhytid

@@ -34,4 +34,10 @@ struct LineSearchResult {
 LineSearchResult line_search(Objective& objective, const Iterate& at, const VectorXd& direction,
                              double slope);
 
+/// Doubles an accepted step while at its end the energy still falls at least at 0.7 of the first rate. The
+/// direction of a projected Hessian can be a hundred times too short where the true curvature is small or
+/// negative along it (a film that has just buckled), and would take as many iterations.
+void lengthen(Objective& objective, const Iterate& at, const VectorXd& direction, double slope,
+              LineSearchResult& found);
+
 }  // namespace rhytid

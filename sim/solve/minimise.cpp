@@ -220,6 +220,7 @@ MinimiserStatus Minimisation::newton() {
     const double slope = at_.gradient.dot(direction), noise = energy_noise(objective_, at_);
     LineSearchResult found;
     if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
+    if (found.accepted && !raw && !always_projected) lengthen(objective_, at_, direction, slope, found);
     report_.evaluations += found.evaluations;
     if (!found.accepted) {
       const bool below_resolution = std::abs(slope) <= noise;
