@@ -13,79 +13,13 @@
 #include <cstdio>
 #include <vector>
 
+#include "long_matrix.h"
 #include "sim/terms/material_point.h"
 
 namespace rhytid {
 namespace {
 
-using Real = long double;
-using Matrix = std::array<std::array<Real, 3>, 3>;
-
-Matrix identity() {
-  return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-}
-Matrix sum(const Matrix& a, Real s, const Matrix& b) {  // a + s b
-  Matrix c = a;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) c[i][j] += s * b[i][j];
-  return c;
-}
-Matrix scaled(const Matrix& a, Real s) {
-  return sum(Matrix{}, s, a);
-}
-Matrix product(const Matrix& a, const Matrix& b) {
-  Matrix c{};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k) c[i][j] += a[i][k] * b[k][j];
-  return c;
-}
-Matrix transposed(const Matrix& a) {
-  Matrix c{};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) c[i][j] = a[j][i];
-  return c;
-}
-Real determinant(const Matrix& a) {
-  return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
-         a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
-         a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
-}
-Matrix inverse(const Matrix& a) {
-  const Real d = determinant(a);
-  Matrix c{};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      const int r = (j + 1) % 3, s = (j + 2) % 3, p = (i + 1) % 3, q = (i + 2) % 3;
-      c[i][j] = (a[r][p] * a[s][q] - a[r][q] * a[s][p]) / d;
-    }
-  return c;
-}
-/// Square root of a matrix with positive eigenvalues (Denman-Beavers).
-Matrix root(const Matrix& a) {
-  Matrix y = a, z = identity();
-  for (int k = 0; k < 12; ++k) {
-    const Matrix next = scaled(sum(y, 1, inverse(z)), 0.5L);
-    z = scaled(sum(z, 1, inverse(y)), 0.5L);
-    y = next;
-  }
-  return y;
-}
-/// ln A = 2^s ln A^(1/2^s); the last by the series 2 (Z + Z³/3 + ...), Z = (A − I)(A + I)⁻¹.
-Matrix logarithm(Matrix a) {
-  constexpr int halvings = 3;
-  for (int k = 0; k < halvings; ++k) a = root(a);
-  const Matrix z = product(sum(a, -1, identity()), inverse(sum(a, 1, identity()))), z2 = product(z, z);
-  Matrix power = z, result = z;
-  for (int n = 3; n < 40; n += 2) {
-    power = product(power, z2);
-    result = sum(result, 1.0L / n, power);
-  }
-  return scaled(result, 2 * (1 << halvings));
-}
-Real trace(const Matrix& a) {
-  return a[0][0] + a[1][1] + a[2][2];
-}
+using namespace test::long_matrix;
 
 struct Constants {
   Real mu_inf, mu_m, bulk, stiffening, tau;

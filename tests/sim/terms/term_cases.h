@@ -82,7 +82,57 @@ inline TermCase skin_case(const KernelTable& kernels, bool viscous, DamperScheme
   return c;
 }
 
-/// Contact, friction or ligaments; parameters by constants, a field and a path with a knot inside the step.
+/// Either skin law under tension λ₁ = 1.1, λ₂ = 0.96 along frames that turn from point to point.
+inline TermCase pre_stretched_case(bool viscous, int order, int thickness_order) {
+  TermCase c = skin_case(viscous ? skin_kernels() : elastic_skin_kernels(), viscous,
+                         DamperScheme::exponential, order, thickness_order, 0.15);
+  c.name = "pre-stretched " + c.name;
+  c.terms.clear();
+  if (viscous)
+    c.terms.emplace_back("skin", pre_stretched_skin_kernels(), PreStretchedLaw<SkinLaw>{});
+  else
+    c.terms.emplace_back("elastic", pre_stretched_elastic_skin_kernels(), PreStretchedLaw<ElasticSkinLaw>{});
+  Rng rng(23);
+  for (int layer = 0; layer < 2; ++layer) {
+    const ElementLayer& e = c.mesh.element_layers[layer];
+    TermGroup g =
+        prism_group(c.mesh, layer, e.slabs.front(), triangle_rule(std::min(12, 2 * order + 2)), e.order + 1);
+    for (int s = 0; s < c.term().kernels().ntheta - 2; ++s)
+      g.theta.push_back({ThetaSlot::Kind::constant, 5 * layer + s, {}});
+    for (int s = 0; s < 2; ++s) g.theta.push_back({ThetaSlot::Kind::constant, 10 + s, {}});
+    g.rest.clear();
+    for (std::size_t q = 0; q < g.weight.size(); ++q) {
+      const Vec3 n = (Vec3(0, 0, 1) + Vec3(uniform(rng, 3, 0.3))).normalized(), t = n.unitOrthogonal();
+      g.rest.insert(g.rest.end(), {t[0], t[1], t[2], n[0], n[1], n[2]});
+    }
+    c.terms.front().add_group(std::move(g));
+  }
+  c.native.conservativeResize(12);
+  c.native.tail(2) << 1.1, 0.96;
+  c.native_scale = c.native;
+  c.native_scale.tail(2).setConstant(0.3);
+  return c;
+}
+
+/// The volumetric term alone, with one Gauss point fewer through each layer.
+inline TermCase volume_case(int order, int thickness_order) {
+  TermCase c = skin_case(elastic_skin_kernels(), false, DamperScheme::none, order, thickness_order);
+  c.name = "volume";
+  c.terms.clear();
+  c.terms.emplace_back("volume", volume_kernels(), VolumeLaw{});
+  for (int layer = 0; layer < 2; ++layer) {
+    const ElementLayer& e = c.mesh.element_layers[layer];
+    TermGroup g =
+        prism_group(c.mesh, layer, e.slabs.front(), triangle_rule(std::min(12, 2 * order + 2)), e.order);
+    g.theta.push_back({ThetaSlot::Kind::constant, layer, {}});
+    c.terms.front().add_group(std::move(g));
+  }
+  c.native = c.native_scale = Vec2(5, 40);
+  return c;
+}
+
+/// Contact, friction or ligaments (of either law); parameters by constants, a field and a path with a knot
+/// inside the step.
 inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice, int order,
                              Mollifier mollifier = Mollifier::quintic) {
   Rng rng(22);
@@ -90,7 +140,7 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
   c.name = kind + " " + choice.name;
   c.mesh = curved_patch(order, 2, rng);
   c.shape = choice.shape;
-  const bool inner = kind == "ligaments";
+  const bool inner = kind == "ligaments" || kind == "fung ligaments";
   TermGroup g = surface_group(c.mesh, inner ? SkinSide::inner : SkinSide::outer, triangle_rule(10));
   c.u_old = smooth_displacement(c.mesh, rng, 0.05);
   c.u = c.u_old + smooth_displacement(c.mesh, rng, 0.1);
@@ -100,7 +150,10 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
   const auto turn = [&](ThetaSlot::Kind k, int part) { return ThetaSlot{k, 12 + part, knots, 4}; };
   if (inner) {
     g.rest.clear();
-    c.terms.emplace_back("ligaments", ligament_kernels(), LigamentLaw{});
+    if (kind == "ligaments")
+      c.terms.emplace_back("ligaments", ligament_kernels(), LigamentLaw{});
+    else
+      c.terms.emplace_back("ligaments", fung_ligament_kernels(), FungLigamentLaw{});
     g.theta = {constant(0), constant(1), {ThetaSlot::Kind::field, 2, {}}};
     c.native = VectorXd::Constant(2 + c.mesh.num_columns, 3) + uniform(rng, 2 + c.mesh.num_columns, 2);
     c.native[0] = 5e-4;

@@ -16,12 +16,16 @@ std::vector<TermCase> all_cases() {
   cases.push_back(skin_case(skin_kernels(), true, DamperScheme::strang, 2, 1));
   cases.push_back(skin_case(skin_kernels(), true, DamperScheme::literal, 1, 2));
   cases.push_back(skin_case(elastic_skin_kernels(), false, DamperScheme::none, 2, 3));
+  cases.push_back(pre_stretched_case(true, 2, 2));
+  cases.push_back(pre_stretched_case(false, 2, 1));
+  cases.push_back(volume_case(2, 2));
   for (const ShapeChoice& s : shapes()) {
     cases.push_back(surface_case("contact", s, 2));
     cases.push_back(surface_case("friction", s, 2, Mollifier::quintic));
   }
   cases.push_back(surface_case("friction", shapes()[0], 3, Mollifier::quadratic));
   cases.push_back(surface_case("ligaments", shapes()[0], 3));
+  cases.push_back(surface_case("fung ligaments", shapes()[0], 3));
   return cases;
 }
 
