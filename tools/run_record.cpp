@@ -24,7 +24,8 @@ ordered_json schemes(const Scene& scene) {
     j["composite_order"] = scene.skin.composite_order;
   }
   j["damper"] = to_string(scene.time.damper);
-  j["time"] = "one implicit step per substep; a step that fails is bisected";
+  j["time"] =
+      "one implicit step per substep; a step that fails is bisected, then started from softened contacts";
   j["friction"] = "normal force and tangent plane lagged from the previous converged step";
   j["minimiser"] = scene.solver.minimiser;
   j["kernels"] = skin_kernel_isa();
@@ -64,12 +65,14 @@ RunRecord::RunRecord(std::string path, const SceneModel& scene_model, const Verb
   fixed_["scene"] = scene_to_json(scene_model.scene());
 }
 
-void RunRecord::add(const MinimiserReport& report, int bisections) {
+void RunRecord::add(const StepRecord& step) {
+  const MinimiserReport& report = step.report;
   ++steps_;
   iterations_ += report.iterations;
   evaluations_ += report.evaluations;
   factorisations_ += report.factorisations;
-  bisected_ += bisections > 0 ? 1 : 0;
+  bisected_ += step.bisections > 0 ? 1 : 0;
+  softened_ += step.softened ? 1 : 0;
 }
 
 void RunRecord::write(const std::string& status, const std::string& reason) const {
@@ -81,7 +84,8 @@ void RunRecord::write(const std::string& status, const std::string& reason) cons
                {"iterations", iterations_},
                {"evaluations", evaluations_},
                {"factorisations", factorisations_},
-               {"bisected_steps", bisected_}};
+               {"bisected_steps", bisected_},
+               {"softened_steps", softened_}};
   j["timings_s"] = {{"setup", setup_seconds}, {"solve", solve_seconds}, {"output", output_seconds}};
   j["resident_MB"] = std::round(resident_memory_mb());
   j.update(fixed_);

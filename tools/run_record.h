@@ -14,8 +14,8 @@ class RunRecord {
   /// `path` of run.json; versions, command, scene after defaults, schemes and sizes are taken at once.
   RunRecord(std::string path, const SceneModel& scene_model, const VerbContext& context);
 
-  /// Totals so far, added per step.
-  void add(const MinimiserReport& report, int bisections);
+  /// Adds a converged step to the totals.
+  void add(const StepRecord& step);
   double setup_seconds = 0, solve_seconds = 0, output_seconds = 0;
   int frames_done = 0;
   int resumed_from = 0;  ///< frame
@@ -29,7 +29,7 @@ class RunRecord {
   std::string path_;
   nlohmann::ordered_json fixed_;
   int frames_ = 0;
-  long steps_ = 0, iterations_ = 0, evaluations_ = 0, factorisations_ = 0, bisected_ = 0;
+  long steps_ = 0, iterations_ = 0, evaluations_ = 0, factorisations_ = 0, bisected_ = 0, softened_ = 0;
 };
 
 }  // namespace rhytid::tools

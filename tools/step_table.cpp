@@ -43,7 +43,7 @@ std::vector<CsvColumn> columns(const Model& model) {
     }
   list.push_back({"stored_energy", "mJ"});
   for (const std::string& name : summed_columns(model)) list.push_back({name, "mJ"});
-  for (const char* name : {"iterations", "evaluations", "factorisations", "bisections"})
+  for (const char* name : {"iterations", "evaluations", "factorisations", "bisections", "softened"})
     list.push_back({name, ""});
   list.push_back({"residual", "N"});
   list.push_back({"tolerance", "N"});
@@ -91,7 +91,8 @@ void StepTable::add(const StepEvent& event) {
     for (const StoredPart& part : term.stored) row.emplace_back(part.energy);
   row.emplace_back(account.stored);
   for (const double sum : sums_) row.emplace_back(sum);
-  for (const int n : {report.iterations, report.evaluations, report.factorisations, event.record.bisections})
+  for (const int n : {report.iterations, report.evaluations, report.factorisations, event.record.bisections,
+                      event.record.softened ? 1 : 0})
     row.push_back(count(n));
   for (const double value : {report.residual, report.tolerance, report.smallest_pivot,
                              reading.smallest_jacobian, reading.largest_displacement})

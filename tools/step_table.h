@@ -11,7 +11,8 @@ namespace rhytid::tools {
 /// Columns: step, frame, time; energy per term in the step's potential (the name says `incremental` where it
 /// includes dissipation); the energy account (sim/time/energy_account.h): stored by part now, and since the
 /// start of the run what was dissipated and what bodies did, by term, then the totals, the numerical
-/// dissipation and what is left over; minimiser; extremes; force and penetration per body.
+/// dissipation and what is left over; minimiser (softened: the step started from softened contacts);
+/// extremes; force and penetration per body.
 class StepTable {
  public:
   explicit StepTable(const Model& model);

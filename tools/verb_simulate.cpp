@@ -113,7 +113,7 @@ class ForwardRun {
   void keep(const StepEvent& event) {
     const double began = now();
     record_.solve_seconds += began - solve_started_;
-    record_.add(event.record.report, event.record.bisections);
+    record_.add(event.record);
     table_.add(event);
     const int frame = event.record.frame;
     if (event.frame_done) {

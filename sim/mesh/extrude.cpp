@@ -28,11 +28,29 @@ void check_options(const ExtrusionOptions& options) {
     require(layer.order >= 1 && layer.order <= 4, "extrude: the thickness order must be 1..4");
     require(layer.by_vertex.size() == 0 || layer.by_vertex.minCoeff() > 0,
             "extrude: layer thickness must be positive at every vertex");
-    require(layer.by_vertex.size() == 0 || !options.composite || options.layers.size() == 1,
-            "extrude: a composite of several layers has constant thicknesses");
   }
   require(options.composite_order >= 1 && options.composite_order <= 4,
           "extrude: the composite order must be 1..4");
+}
+
+double total_thickness(const ExtrusionOptions& options);
+
+/// The slabs of a composite are the same everywhere: a thickness per vertex has to scale all layers alike.
+void check_ratios(const TriangleSurface& surface, const ExtrusionOptions& options) {
+  const auto at = [](const ExtrusionLayer& layer, Eigen::Index vertex) {
+    return layer.by_vertex.size() > 0 ? layer.by_vertex[vertex] : layer.thickness;
+  };
+  const double mean = total_thickness(options);
+  for (Eigen::Index vertex = 0; vertex < surface.vertices.rows(); ++vertex) {
+    double total = 0;
+    for (const ExtrusionLayer& layer : options.layers) total += at(layer, vertex);
+    for (const ExtrusionLayer& layer : options.layers)
+      if (std::abs(at(layer, vertex) / total - layer.thickness / mean) > 1e-6)
+        throw InputError(
+            surface.origin + ": vertex " + std::to_string(surface.file_vertex(static_cast<int>(vertex))),
+            "layers of a composite whose thicknesses do not keep their ratio",
+            "a thickness_map for every layer, all in one ratio, or the stacked scheme");
+  }
 }
 
 double total_thickness(const ExtrusionOptions& options) {
@@ -163,6 +181,9 @@ SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options
   for (const ExtrusionLayer& layer : options.layers) {
     require(layer.by_vertex.size() == 0 || layer.by_vertex.size() == surface.vertices.rows(),
             "extrude: a thickness per vertex needs one for every vertex");
+  }
+  if (options.composite && options.layers.size() > 1) check_ratios(surface, options);
+  for (const ExtrusionLayer& layer : options.layers) {
     thickness.push_back(layer.by_vertex.size() > 0
                             ? interpolate_vertices(surface, columns.face_columns, basis, layer.by_vertex)
                             : VectorXd::Constant(columns.positions.rows(), layer.thickness));

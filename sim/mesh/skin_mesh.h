@@ -80,8 +80,8 @@ struct ExtrusionOptions {
 /// composite fill slabs of w in proportion to their thickness.
 /// Validates the surface first; throws InputError when the extrusion folds (J ≤ 0 at a node of some element),
 /// naming face numbers, the depth at which the first fold appears, and a hint.
-/// A thickness per vertex is linear on the faces; it needs the stacked scheme or a single layer, since the
-/// slabs of a composite are the same everywhere.
+/// A thickness per vertex is linear on the faces; in a composite the layers have to keep their ratio, since
+/// its slabs are the same everywhere (InputError naming the vertex).
 SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options);
 
 /// Values at all columns from values at the vertices of mesh.surface, linear on every face.

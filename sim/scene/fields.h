@@ -77,6 +77,7 @@ void fields(Archive& archive, T& skin) {
   archive("scheme", skin.scheme);
   archive("composite_order", skin.composite_order);
   archive.group("quadrature", true, [&skin](auto& quadrature) {
+    quadrature("rule", skin.rule);
     quadrature("triangle_degree", skin.triangle_degree);
     quadrature("thickness_points", skin.thickness_points);
     quadrature("prism_degree", skin.prism_degree);

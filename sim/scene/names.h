@@ -35,6 +35,10 @@ struct EnumNames<VolumeQuadrature> {
   static constexpr std::array<std::string_view, 2> words{"full", "reduced"};
 };
 template <>
+struct EnumNames<RuleKind> {
+  static constexpr std::array<std::string_view, 2> words{"product", "sheet"};
+};
+template <>
 struct EnumNames<ShapeKind> {
   static constexpr std::array<std::string_view, 5> words{"sphere", "plane", "imls", "capsule", "ellipsoid"};
 };

@@ -148,6 +148,13 @@ std::vector<Rule> skin_rules() {
        .type = object,
        .fallback = json::object(),
        .doc = "Quadrature rules; the defaults follow the element orders."},
+      {.pointer = "/skin/quadrature/rule",
+       .type = option,
+       .fallback = to_string(skin.rule),
+       .options = enum_words<RuleKind>(),
+       .doc =
+           "product: a triangle rule times Gauss points through each layer. sheet: the prism rules that the "
+           "publication uses for its sheets, of total degree 1 (2 points), 4, 5, 6 for p = 1, 2, 3, 4."},
       {.pointer = "/skin/quadrature/triangle_degree",
        .type = integer,
        .fallback = skin.triangle_degree,
@@ -165,9 +172,8 @@ std::vector<Rule> skin_rules() {
        .fallback = skin.prism_degree,
        .min = 0,
        .max = 8,
-       .doc = "Total degree of a prism rule for each layer in place of triangle_degree and thickness_points; "
-              "the "
-              "publication's sheets take 1 (2 points), 4, 5, 6 for p = 1, 2, 3, 4. 0 = the product rule."},
+       .doc = "Total degree of a prism rule for each layer in place of triangle_degree and thickness_points. "
+              "0 = the product rule."},
       {.pointer = "/skin/quadrature/volume",
        .type = option,
        .fallback = to_string(skin.volume),

@@ -225,34 +225,27 @@ void check_crop(const LocatedJson& scene) {
                        "low below high in every coordinate");
 }
 
-/// Quadrature keys that exclude each other, the direction of a pre-stretch, thickness per vertex in a
-/// composite.
+/// Quadrature keys that exclude each other, the direction of a pre-stretch.
 void check_skin(const LocatedJson& scene) {
   const json& root = scene.json;
   const json& quadrature = root["skin"]["quadrature"];
-  if (quadrature["prism_degree"].get<int>() > 0) {
-    for (const char* key : {"triangle_degree", "thickness_points"})
-      if (quadrature[key].get<int>() > 0) {
+  const bool is_sheet = quadrature["rule"] == "sheet";
+  if (is_sheet || quadrature["prism_degree"].get<int>() > 0) {
+    const char* const prism = is_sheet ? "the sheet rule" : "prism_degree";
+    for (const char* key : {"triangle_degree", "thickness_points", "prism_degree"})
+      if (quadrature[key].get<int>() > 0 && (is_sheet || std::string(key) != "prism_degree")) {
         const std::string at = std::string("/skin/quadrature/") + key;
-        throw InputError(scene.where(at) + ": " + at, "both it and prism_degree", "one of the two");
+        throw InputError(scene.where(at) + ": " + at, std::string("both it and ") + prism, "one of the two");
       }
     if (quadrature["volume"] == "reduced")
       throw InputError(scene.where("/skin/quadrature/volume") + ": /skin/quadrature/volume",
-                       "\"reduced\" with a prism_degree", "\"full\", or a product rule");
+                       std::string("\"reduced\" with ") + prism, "\"full\", or a product rule");
   }
   if (quadrature["volume"] == "reduced" && quadrature["thickness_points"] == 1)
     throw InputError(scene.where("/skin/quadrature/thickness_points") + ": /skin/quadrature/thickness_points",
                      "1 with a reduced volume", "2 or more");
   if (root["skin"].contains("pre_stretch") && root["skin"]["pre_stretch"].contains("direction"))
     require_direction(scene, root["skin"]["pre_stretch"], "/skin/pre_stretch", "direction");
-  if (root["skin"]["scheme"] == "composite" && root["skin"]["layers"].size() > 1)
-    for (size_t i = 0; i < root["skin"]["layers"].size(); ++i)
-      if (root["skin"]["layers"][i].contains("thickness_map")) {
-        const std::string at = "/skin/layers/" + std::to_string(i) + "/thickness_map";
-        throw InputError(scene.where(at) + ": " + at,
-                         "a thickness per vertex in a composite of several layers",
-                         "the stacked scheme, or one layer");
-      }
 }
 
 /// Positive, and no flatter than the nearest point to a place can be found for (sim/surface/shapes.h).

@@ -112,6 +112,32 @@ TEST(StepTable, work_of_an_elastic_press_is_stored) {
   }
 }
 
+TEST(StepTable, a_step_that_needed_softened_contacts_says_so) {
+  const SceneModel m(parse_scene_text(pressed_patch(1), "pressed",
+                                      {"/colliders/ball/stiffness=1000", "/colliders/ball/onset=0.0001"}));
+  RunOptions options = m.run_options();
+  options.max_bisections = 0;
+  options.minimiser.max_iterations = 2000;
+  std::vector<double> softened[2];
+  int needed = 0;
+  for (const bool starved : {false, true}) {
+    if (starved) options.minimiser.max_iterations = needed - 1;
+    StepTable table(m.model());
+    RunObserver observer;
+    observer.step = [&](const StepEvent& e) {
+      table.add(e);
+      needed = std::max(needed, starved ? 0 : e.record.report.iterations);
+    };
+    const Trajectory run = simulate(m.model(), m.native(), options, observer);
+    ASSERT_TRUE(run.complete) << run.failure;
+    const Column c = parse(table.table().text());
+    const auto at = std::find(c.names.begin(), c.names.end(), "softened") - c.names.begin();
+    for (const auto& row : c.rows) softened[starved].push_back(row[static_cast<std::size_t>(at)]);
+  }
+  EXPECT_THAT(softened[0], testing::Each(0));
+  EXPECT_THAT(softened[1], testing::Contains(1));
+}
+
 TEST(StepTable, viscous_skin_and_friction_dissipate) {
   const Column t = parse(run(SceneModel(parse_scene_text(test::drag_scene(2, 8), "drag.json"))));
   EXPECT_GT(t.last("dissipated_skin_mJ"), 0);

@@ -30,6 +30,10 @@ double relaxing_part(const Scene& scene, const LayerScene& l) {
 
 /// The rule in one slab of an element layer of thickness order `order`. `fewer` Gauss points less through it.
 PrismRule slab_rule(const SkinScene& skin, int order, int fewer) {
+  if (skin.rule == RuleKind::sheet) {
+    constexpr int kDegrees[] = {1, 4, 5, 6};  // numerics-notes A.2
+    return prism_rule(kDegrees[skin.order - 1]);
+  }
   if (skin.prism_degree > 0) return prism_rule(skin.prism_degree);
   const int degree = skin.triangle_degree > 0 ? skin.triangle_degree : 2 * skin.order + 2;
   const int points = skin.thickness_points > 0 ? skin.thickness_points : order + 1;

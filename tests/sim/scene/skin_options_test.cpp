@@ -122,7 +122,34 @@ TEST_F(SkinFiles, BadFilesAreNamed) {
   const std::vector<std::string> settings = {"/skin/layers/soft/thickness=null",
                                              "/skin/layers/soft/thickness_map=" + short_table};
   EXPECT_THAT(error_of([&] { SceneModel m(drag(settings)); }), HasSubstr("no value for vertex 2"));
-  EXPECT_THAT(error_of([&] { SceneModel m(drag(settings, "composite")); }), HasSubstr("the stacked scheme"));
+  const std::vector<std::string> one_layer = {
+      "/skin/layers/soft/thickness=null",
+      "/skin/layers/soft/thickness_map=" +
+          write("t.csv", table([](const Vec3& x) { return 1.5 + 0.02 * x[0]; }))};
+  EXPECT_THAT(error_of([&] { SceneModel m(drag(one_layer, "composite")); }), HasSubstr("keep their ratio"));
+}
+
+TEST_F(SkinFiles, ThicknessPerVertexOfACompositeScalesAllLayers) {
+  const auto scale = [](const Vec3& x) { return 1 + 0.01 * x[0] - 0.02 * x[1]; };
+  const SceneModel m(drag({"/skin/layers/soft/thickness=null", "/skin/layers/film/thickness=null",
+                           "/skin/layers/soft/thickness_map=" +
+                               write("s.csv", table([&](const Vec3& x) { return 1.5 * scale(x); })),
+                           "/skin/layers/film/thickness_map=" +
+                               write("f.csv", table([&](const Vec3& x) { return 0.15 * scale(x); }))},
+                          "composite"));
+  const SkinMesh& mesh = m.model().mesh;
+  for (int c = 0; c < mesh.num_columns; ++c) {
+    const Vec3 inner = mesh.rest.row(mesh.node(c, 0)),
+               outer = mesh.rest.row(mesh.node(c, mesh.num_levels - 1));
+    EXPECT_NEAR(outer[2] - inner[2], 1.65 * scale(outer), 1e-12);
+  }
+  // Each material has the volume of its own thickness.
+  const double thickness[] = {1.5, 0.15};
+  for (const TermGroup& g : m.model().terms.front().groups()) {
+    double volume = 0;
+    for (const double w : g.weight) volume += w;
+    EXPECT_NEAR(volume, 16 * 12 * thickness[&g - m.model().terms.front().groups().data()], 1e-10);
+  }
 }
 
 TEST_F(SkinFiles, LigamentMapPerVertex) {
@@ -168,6 +195,17 @@ TEST(SkinQuadrature, PrismRulesAreMappedPerLayer) {
                 drag({"/skin/quadrature/prism_degree=4", "/skin/quadrature/volume=reduced"});
               }),
               HasSubstr("product rule"));
+}
+
+TEST(SkinQuadrature, SheetsTakeThePublicationsRules) {
+  const int points[] = {2, 11, 16, 28};
+  for (int p = 1; p <= 4; ++p) {
+    const SceneModel m(drag({"/skin/quadrature/rule=sheet", "/skin/order=" + std::to_string(p)}));
+    for (const TermGroup& g : m.model().terms.front().groups()) EXPECT_EQ(g.num_points, points[p - 1]);
+    EXPECT_EQ(scene_to_json(m.scene())["skin"]["quadrature"]["rule"], "sheet");
+  }
+  for (const char* other : {"/skin/quadrature/prism_degree=4", "/skin/quadrature/triangle_degree=8"})
+    EXPECT_THAT(error_of([&] { drag({"/skin/quadrature/rule=sheet", other}); }), HasSubstr("one of the two"));
 }
 
 TEST(SkinQuadrature, ReducedVolumeHasPointsOfItsOwnAndTheSameHistory) {

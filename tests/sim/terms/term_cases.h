@@ -13,7 +13,9 @@
 #include "sim/terms/term.h"
 
 namespace rhytid {
-extern const KernelTable skin_table_baseline, elastic_table_baseline, skin_table_avx2, elastic_table_avx2;
+extern const KernelTable skin_table_baseline, elastic_table_baseline, skin_table_avx2, elastic_table_avx2,
+    volume_table_baseline, volume_table_avx2, pre_stretched_skin_table_baseline,
+    pre_stretched_skin_table_avx2, pre_stretched_elastic_table_baseline, pre_stretched_elastic_table_avx2;
 }
 
 namespace rhytid::test {
@@ -83,15 +85,15 @@ inline TermCase skin_case(const KernelTable& kernels, bool viscous, DamperScheme
 }
 
 /// Either skin law under tension λ₁ = 1.1, λ₂ = 0.96 along frames that turn from point to point.
-inline TermCase pre_stretched_case(bool viscous, int order, int thickness_order) {
+inline TermCase pre_stretched_case(const KernelTable& kernels, bool viscous, int order, int thickness_order) {
   TermCase c = skin_case(viscous ? skin_kernels() : elastic_skin_kernels(), viscous,
                          DamperScheme::exponential, order, thickness_order, 0.15);
   c.name = "pre-stretched " + c.name;
   c.terms.clear();
   if (viscous)
-    c.terms.emplace_back("skin", pre_stretched_skin_kernels(), PreStretchedLaw<SkinLaw>{});
+    c.terms.emplace_back("skin", kernels, PreStretchedLaw<SkinLaw>{});
   else
-    c.terms.emplace_back("elastic", pre_stretched_elastic_skin_kernels(), PreStretchedLaw<ElasticSkinLaw>{});
+    c.terms.emplace_back("elastic", kernels, PreStretchedLaw<ElasticSkinLaw>{});
   Rng rng(23);
   for (int layer = 0; layer < 2; ++layer) {
     const ElementLayer& e = c.mesh.element_layers[layer];
@@ -115,11 +117,11 @@ inline TermCase pre_stretched_case(bool viscous, int order, int thickness_order)
 }
 
 /// The volumetric term alone, with one Gauss point fewer through each layer.
-inline TermCase volume_case(int order, int thickness_order) {
+inline TermCase volume_case(const KernelTable& kernels, int order, int thickness_order) {
   TermCase c = skin_case(elastic_skin_kernels(), false, DamperScheme::none, order, thickness_order);
   c.name = "volume";
   c.terms.clear();
-  c.terms.emplace_back("volume", volume_kernels(), VolumeLaw{});
+  c.terms.emplace_back("volume", kernels, VolumeLaw{});
   for (int layer = 0; layer < 2; ++layer) {
     const ElementLayer& e = c.mesh.element_layers[layer];
     TermGroup g =

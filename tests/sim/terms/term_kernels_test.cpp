@@ -16,9 +16,9 @@ std::vector<TermCase> all_cases() {
   cases.push_back(skin_case(skin_kernels(), true, DamperScheme::strang, 2, 1));
   cases.push_back(skin_case(skin_kernels(), true, DamperScheme::literal, 1, 2));
   cases.push_back(skin_case(elastic_skin_kernels(), false, DamperScheme::none, 2, 3));
-  cases.push_back(pre_stretched_case(true, 2, 2));
-  cases.push_back(pre_stretched_case(false, 2, 1));
-  cases.push_back(volume_case(2, 2));
+  cases.push_back(pre_stretched_case(pre_stretched_skin_kernels(), true, 2, 2));
+  cases.push_back(pre_stretched_case(pre_stretched_elastic_skin_kernels(), false, 2, 1));
+  cases.push_back(volume_case(volume_kernels(), 2, 2));
   for (const ShapeChoice& s : shapes()) {
     cases.push_back(surface_case("contact", s, 2));
     cases.push_back(surface_case("friction", s, 2, Mollifier::quintic));
@@ -207,53 +207,64 @@ TEST(TermKernels, InstructionSetsAgree) {
   if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) GTEST_SKIP() << "no AVX2 here";
   Rng rng(8);
   constexpr int D = kDirections;
-  for (bool viscous : {true, false})
+  std::vector<std::pair<TermCase, TermCase>> pairs;
+  for (bool viscous : {true, false}) {
     for (const auto& [p, q] : {std::pair{1, 1}, {2, 2}, {4, 3}}) {
-      SCOPED_TRACE("p = " + std::to_string(p) + (viscous ? ", viscous" : ", elastic"));
-      const TermCase a = skin_case(viscous ? skin_table_avx2 : elastic_table_avx2, viscous,
-                                   DamperScheme::exponential, p, q, p == 4 ? 0.03 : 0.2),
-                     b = skin_case(viscous ? skin_table_baseline : elastic_table_baseline, viscous,
-                                   DamperScheme::exponential, p, q, p == 4 ? 0.03 : 0.2);
-      const int nu = static_cast<int>(a.u.size()), nh = static_cast<int>(a.history.size());
-      const VectorXd adj = uniform(rng, nu), s_bar = uniform(rng, nh);
-      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, D, Eigen::RowMajor>;
-      const RowMajor du = RowMajor::Random(nu, D), ds = RowMajor::Random(nh, D);
-      const VectorXd dn = uniform(rng, 10);
-      std::vector<VectorXd> results[2];
-      for (const TermCase* c : {&a, &b}) {
-        auto& r = results[c == &b];
-        TermStepData data;
-        c->term().prepare(c->step, c->native, c->u_old, c->history.data(), data);
-        r.push_back(
-            Eigen::Map<VectorXd>(data.prepared.data(), static_cast<Eigen::Index>(data.prepared.size())));
-        VectorXd g = VectorXd::Zero(nu);
-        r.push_back(VectorXd::Constant(1, c->term().energy(c->step, data, c->u, &g, nullptr)));
-        r.push_back(g);
-        for (bool projected : {false, true}) {
-          DenseSink sink(nu);
-          c->term().hessian(c->step, data, c->u, projected, sink);
-          r.push_back(Eigen::Map<VectorXd>(sink.matrix.data(), sink.matrix.size()));
-        }
-        VectorXd h = VectorXd::Zero(nh);
-        c->term().update(c->step, data, c->u, h.data());
-        r.push_back(h);
-        RowMajor df = RowMajor::Zero(nu, D), dh = RowMajor::Zero(nh, D);
-        c->term().tangent(c->step, data, c->u, c->u_old, c->history.data(),
-                          {D, du.data(), du.data(), ds.data(), {&dn}}, df.data(), dh.data());
-        r.push_back(Eigen::Map<VectorXd>(df.data(), df.size()));
-        r.push_back(Eigen::Map<VectorXd>(dh.data(), dh.size()));
-        VectorXd ub = VectorXd::Zero(nu), uob = ub, sb = VectorXd::Zero(nh), nb = VectorXd::Zero(10);
-        c->term().adjoint_update(c->step, data, c->u, s_bar.data(), ub);
-        c->term().adjoint_step(c->step, data, c->u, c->u_old, c->history.data(), adj, s_bar.data(), uob,
-                               sb.data(), nb);
-        for (const VectorXd& v : {ub, uob, sb, nb}) r.push_back(v);
-      }
-      ASSERT_TRUE(std::isfinite(results[0][1][0]));
-      for (std::size_t k = 0; k < results[0].size(); ++k)
-        EXPECT_LE((results[0][k] - results[1][k]).norm(), 1e-13 * results[1][k].norm() + 1e-300)
-            << "result " << k << ", relative error "
-            << (results[0][k] - results[1][k]).norm() / results[1][k].norm();
+      const auto one = [&, p = p, q = q](const KernelTable& table) {
+        return skin_case(table, viscous, DamperScheme::exponential, p, q, p == 4 ? 0.03 : 0.2);
+      };
+      pairs.emplace_back(one(viscous ? skin_table_avx2 : elastic_table_avx2),
+                         one(viscous ? skin_table_baseline : elastic_table_baseline));
     }
+    const auto stretched = [&](const KernelTable& table) { return pre_stretched_case(table, viscous, 2, 2); };
+    pairs.emplace_back(
+        stretched(viscous ? pre_stretched_skin_table_avx2 : pre_stretched_elastic_table_avx2),
+        stretched(viscous ? pre_stretched_skin_table_baseline : pre_stretched_elastic_table_baseline));
+  }
+  pairs.emplace_back(volume_case(volume_table_avx2, 2, 2), volume_case(volume_table_baseline, 2, 2));
+  for (const auto& [a, b] : pairs) {
+    SCOPED_TRACE(a.name + ", p = " + std::to_string(a.mesh.order));
+    const int nu = static_cast<int>(a.u.size()), nh = static_cast<int>(a.history.size());
+    const VectorXd adj = uniform(rng, nu), s_bar = uniform(rng, nh);
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, D, Eigen::RowMajor>;
+    const RowMajor du = RowMajor::Random(nu, D), ds = RowMajor::Random(nh, D);
+    const VectorXd dn = uniform(rng, static_cast<int>(a.native.size()));
+    std::vector<VectorXd> results[2];
+    for (const TermCase* c : {&a, &b}) {
+      auto& r = results[c == &b];
+      TermStepData data;
+      c->term().prepare(c->step, c->native, c->u_old, c->history.data(), data);
+      r.push_back(
+          Eigen::Map<VectorXd>(data.prepared.data(), static_cast<Eigen::Index>(data.prepared.size())));
+      VectorXd g = VectorXd::Zero(nu);
+      r.push_back(VectorXd::Constant(1, c->term().energy(c->step, data, c->u, &g, nullptr)));
+      r.push_back(g);
+      for (bool projected : {false, true}) {
+        DenseSink sink(nu);
+        c->term().hessian(c->step, data, c->u, projected, sink);
+        r.push_back(Eigen::Map<VectorXd>(sink.matrix.data(), sink.matrix.size()));
+      }
+      VectorXd h = VectorXd::Zero(nh);
+      c->term().update(c->step, data, c->u, h.data());
+      r.push_back(h);
+      RowMajor df = RowMajor::Zero(nu, D), dh = RowMajor::Zero(nh, D);
+      c->term().tangent(c->step, data, c->u, c->u_old, c->history.data(),
+                        {D, du.data(), du.data(), ds.data(), {&dn}}, df.data(), dh.data());
+      r.push_back(Eigen::Map<VectorXd>(df.data(), df.size()));
+      r.push_back(Eigen::Map<VectorXd>(dh.data(), dh.size()));
+      VectorXd ub = VectorXd::Zero(nu), uob = ub, sb = VectorXd::Zero(nh),
+               nb = VectorXd::Zero(a.native.size());
+      c->term().adjoint_update(c->step, data, c->u, s_bar.data(), ub);
+      c->term().adjoint_step(c->step, data, c->u, c->u_old, c->history.data(), adj, s_bar.data(), uob,
+                             sb.data(), nb);
+      for (const VectorXd& v : {ub, uob, sb, nb}) r.push_back(v);
+    }
+    ASSERT_TRUE(std::isfinite(results[0][1][0]));
+    for (std::size_t k = 0; k < results[0].size(); ++k)
+      EXPECT_LE((results[0][k] - results[1][k]).norm(), 1e-13 * results[1][k].norm() + 1e-300)
+          << "result " << k << ", relative error "
+          << (results[0][k] - results[1][k]).norm() / results[1][k].norm();
+  }
 }
 #endif
 
