@@ -148,6 +148,23 @@ class DoubleWellChain : public ChainObjective {
   }
 };
 
+/// A film just past its onset: in x each block has stiffness 1 in one piece and −(1 + excess) in the other,
+/// and a quartic: least at x = ±√excess. The projected Hessian drops the negative one and is 1/excess times
+/// too stiff. The first block has no negative piece and stays at 0; hold the last, which has no other.
+class JustBuckledChain : public ChainObjective {
+ public:
+  using ChainObjective::ChainObjective;
+  double excess = 0.01;
+  double piece(int, const Vector6& v, Vector6& gradient, Matrix6& hessian) const override {
+    const double x = v[3], negative = -(1 + excess);
+    gradient = v;
+    gradient[3] = negative * x + x * x * x;
+    hessian.setIdentity();
+    hessian(3, 3) = negative + 3 * x * x;
+    return 0.5 * v.squaredNorm() - 0.5 * x * x + 0.5 * negative * x * x + x * x * x * x / 4;
+  }
+};
+
 /// Σ over the components of both blocks of x − log x, defined for x > 0 only, plus ½ |difference|². Minimum
 /// at 1.
 class BarrierChain : public ChainObjective {

@@ -101,6 +101,18 @@ TEST(Minimise, LeavesAnExactSaddle) {
   }
 }
 
+TEST(Minimise, LengthensStepsOfAProjectedHessianThatIsFarTooStiff) {
+  JustBuckledChain objective(12);
+  objective.fixed = {33, 34, 35};
+  VectorXd start = VectorXd::Zero(36);
+  for (int i = 1; i < 11; ++i) start[3 * i] = 1e-4 * (i % 2 ? 1 : -1);
+  const auto [report, q, factor, matrix] = solve(objective, start, {});
+  EXPECT_TRUE(report.converged()) << name(report.status);
+  EXPECT_LT(report.iterations, 30) << "a hundred of its own steps make one that matters";
+  EXPECT_EQ(report.evaluations, objective.evaluations);
+  for (int i = 1; i < 11; ++i) EXPECT_NEAR(std::abs(q[3 * i]), 0.1, 1e-8);
+}
+
 TEST(Minimise, WithoutCertificateASaddlePasses) {
   DoubleWellChain objective(5);
   MinimiserOptions options;
