@@ -4,6 +4,7 @@
 #include "fitting/case_rules.h"
 #include "tools/all_verbs.h"
 #include "tools/environment.h"
+#include "tools/study/experiment.h"
 #include "tools/threads.h"
 
 int main(int argc, char** argv) {
@@ -16,6 +17,7 @@ int main(int argc, char** argv) {
       "video.";
   program.verbs = make_all_verbs();
   program.environment_checks = {fitting_environment};
-  program.formats = {{"case", rhytid::fitting::case_schema, rhytid::fitting::case_documentation}};
+  program.formats = {{"case", rhytid::fitting::case_schema, rhytid::fitting::case_documentation},
+                     {"experiment", experiment_schema, experiment_documentation}};
   return run_program(program, argc, argv, std::cout, std::cerr);
 }

@@ -2,6 +2,7 @@
 #include <iostream>
 
 #include "tools/forward_verbs.h"
+#include "tools/study/experiment.h"
 #include "tools/threads.h"
 #include "tools/verb.h"
 
@@ -12,5 +13,6 @@ int main(int argc, char** argv) {
   program.name = "rhytid-forward";
   program.description = "Rhytid, forward only: simulates skin that is pushed and dragged over bone.";
   program.verbs = make_forward_verbs();
+  program.formats = {{"experiment", experiment_schema, experiment_documentation}};
   return run_program(program, argc, argv, std::cout, std::cerr);
 }

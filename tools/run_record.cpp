@@ -86,7 +86,10 @@ void RunRecord::write(const std::string& status, const std::string& reason) cons
                {"factorisations", factorisations_},
                {"bisected_steps", bisected_},
                {"softened_steps", softened_}};
-  j["timings_s"] = {{"setup", setup_seconds}, {"solve", solve_seconds}, {"output", output_seconds}};
+  j["timings_s"] = {{"setup", setup_seconds},
+                    {"solve", solve_seconds},
+                    {"solve_cpu", solve_cpu_seconds},
+                    {"output", output_seconds}};
   j["resident_MB"] = std::round(resident_memory_mb());
   j.update(fixed_);
   write_file(path_, j.dump(2) + "\n");

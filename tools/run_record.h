@@ -17,6 +17,7 @@ class RunRecord {
   /// Adds a converged step to the totals.
   void add(const StepRecord& step);
   double setup_seconds = 0, solve_seconds = 0, output_seconds = 0;
+  double solve_cpu_seconds = 0;  ///< of all threads
   int frames_done = 0;
   int resumed_from = 0;  ///< frame
 

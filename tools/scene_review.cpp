@@ -52,7 +52,7 @@ void review_wrinkles(const SceneModel& scene_model, std::vector<std::string>& wa
 
 void review_support(const SceneModel& scene_model, const StepCost& cost, std::vector<std::string>& warnings) {
   const Scene& scene = scene_model.scene();
-  if (scene.skin.rim == RimCondition::clamped) return;
+  if (scene.skin.rim == RimCondition::clamped || !scene.skin.held.empty()) return;
   // A pivot this far below the largest is a rigid motion that only rounding resists.
   if (cost.positive_definite && cost.smallest_pivot > 1e-13 * cost.largest_pivot) return;
   const std::string rim = scene.skin.rim == RimCondition::free ? "a free rim" : "a sliding rim";

@@ -13,19 +13,21 @@ namespace {
 class Schema : public Verb {
  public:
   VerbHelp help() const override {
-    return {"schema",
-            "print the format of scenes or cases as JSON Schema, or as documentation",
-            "Prints the format of scene files, or of case files ('schema case', in the program that fits). "
-            "Validation, this schema and the documentation come from the same table of rules, so they agree. "
-            "Give "
-            "the schema to an editor for completion and checks while typing.",
-            "nothing",
-            "JSON Schema (draft 2020-12) on stdout; Markdown with --docs",
-            "rhytid schema > scene.schema.json"};
+    return {
+        "schema",
+        "print the format of scenes, cases or experiments as JSON Schema, or as documentation",
+        "Prints the format of scene files, of experiments ('schema experiment'), or of case files ('schema "
+        "case', in the program that fits). "
+        "Validation, this schema and the documentation come from the same table of rules, so they agree. "
+        "Give "
+        "the schema to an editor for completion and checks while typing.",
+        "nothing",
+        "JSON Schema (draft 2020-12) on stdout; Markdown with --docs",
+        "rhytid schema > scene.schema.json"};
   }
   bool takes_file() const override { return false; }
   void add_options(CLI::App& app) override {
-    app.add_option("format", format_, "scene (default) or case")->option_text("FORMAT");
+    app.add_option("format", format_, "scene (default), experiment or case")->option_text("FORMAT");
     app.add_flag("--docs", as_documentation_, "the format as Markdown: every key, unit, range and default");
   }
 

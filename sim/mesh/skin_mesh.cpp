@@ -1,5 +1,7 @@
 #include "sim/mesh/skin_mesh.h"
 
+#include <random>
+
 #include "sim/core/error.h"
 #include "sim/mesh/columns.h"
 
@@ -33,6 +35,17 @@ std::vector<int> SkinMesh::inner_nodes(int face) const {
 }
 std::vector<int> SkinMesh::outer_nodes(int face) const {
   return trace_nodes(*this, face, num_levels - 1);
+}
+
+void add_imperfection(SkinMesh& mesh, double amplitude, int seed) {
+  require(amplitude >= 0, "add_imperfection: the amplitude must not be negative");
+  std::mt19937 random(static_cast<unsigned>(seed));
+  for (int column = 0; column < mesh.num_columns; ++column) {
+    // Distributions of the standard library differ between its makers.
+    const double uniform = 2 * (static_cast<double>(random()) / 4294967295.) - 1;
+    for (int level = 0; level < mesh.num_levels; ++level)
+      mesh.rest.row(mesh.node(column, level)) += amplitude * uniform * mesh.column_normals.row(column);
+  }
 }
 
 VectorXd interpolate_vertices(const SkinMesh& mesh, const VectorXd& at_vertices) {

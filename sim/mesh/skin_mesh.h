@@ -84,6 +84,10 @@ struct ExtrusionOptions {
 /// its slabs are the same everywhere (InputError naming the vertex).
 SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options);
 
+/// Moves every column of nodes along its normal by a random length, uniform in ±amplitude (mm). The same seed
+/// gives the same numbers on every machine.
+void add_imperfection(SkinMesh& mesh, double amplitude, int seed);
+
 /// Values at all columns from values at the vertices of mesh.surface, linear on every face.
 VectorXd interpolate_vertices(const SkinMesh& mesh, const VectorXd& at_vertices);
 

@@ -101,6 +101,12 @@ TriangleSurface crop_box(const TriangleSurface& surface, const Vec3& low, const 
 TriangleSurface crop_vertices(const TriangleSurface& surface, const std::vector<int>& indices,
                               const std::string& list_origin);
 
+/// Loop subdivision: every pass splits each face into four and smooths; the rim becomes a cubic spline
+/// through its own vertices. New vertices and faces count as copies of their coarse ones in messages. Throws
+/// what validate_surface throws. Source  C. Loop 1987, with the vertex weights of J. Warren (3/16 for valence
+/// 3, else 3/8n).
+TriangleSurface subdivide_surface(const TriangleSurface& surface, int passes);
+
 /// Refuses what the simulator cannot extrude: no faces, index out of range, degenerate or duplicate faces,
 /// non-manifold edges or vertices, inconsistent orientation, several components, vertices without a face,
 /// absurd scale (box diagonal outside 1..1000 mm). Throws InputError with face or vertex numbers (of the

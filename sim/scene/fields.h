@@ -53,6 +53,7 @@ void fields(Archive& archive, T& surface) {
     if (crop.has("vertices_file", !surface.crop_vertices_file.empty()))
       crop("vertices_file", surface.crop_vertices_file);
   });
+  if (archive.has("subdivide", surface.subdivide > 0)) archive("subdivide", surface.subdivide);
   archive.flag("side", "outer", "inner", surface.is_outer);
   archive.group("grid", surface.file.empty(), [&surface](auto& grid) {
     grid("size", surface.grid_size);
@@ -61,6 +62,26 @@ void fields(Archive& archive, T& surface) {
     grid("bend_radius", surface.bend_radius);
   });
   archive("normal_smoothing", surface.normal_smoothing);
+  archive.group("imperfection", surface.imperfection_amplitude > 0, [&surface](auto& imperfection) {
+    imperfection("amplitude", surface.imperfection_amplitude);
+    imperfection("seed", surface.imperfection_seed);
+  });
+}
+
+template <class Archive, FieldsOf<HeldKnot> T>
+void fields(Archive& archive, T& knot) {
+  archive("time", knot.time);
+  archive("displacement", knot.displacement);
+}
+
+template <class Archive, FieldsOf<HeldScene> T>
+void fields(Archive& archive, T& held) {
+  archive("name", held.name);
+  archive.group("box", true, [&held](auto& box) {
+    box("low", held.low);
+    box("high", held.high);
+  });
+  if (archive.has("path", !held.path.empty())) archive("path", held.path);
 }
 
 template <class Archive, FieldsOf<PreStretchScene> T>
@@ -85,6 +106,7 @@ void fields(Archive& archive, T& skin) {
     quadrature("contact_degree", skin.contact_degree);
   });
   archive("rim", skin.rim);
+  if (archive.has("held", !skin.held.empty())) archive("held", skin.held);
   archive("pre_stretch", skin.pre_stretch);
   archive("layers", skin.layers);
 }

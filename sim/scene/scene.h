@@ -46,12 +46,15 @@ struct SurfaceScene {
   std::optional<Vec3> crop_low, crop_high;  ///< mm, corners of a box
   std::vector<int> crop_vertices;           ///< indices in the mesh file, from 0
   std::string crop_vertices_file;           ///< the same in a text file
+  int subdivide = 0;                        ///< passes of Loop subdivision after the crop
   bool is_outer = true;                     ///< the surface is the outer skin (else the inner face)
   std::array<double, 2> grid_size{0, 0};    ///< mm
   std::array<int, 2> grid_cells{0, 0};
   std::string grid_pattern = "union_jack";
   double bend_radius = 0;  ///< mm, 0 = flat
   int normal_smoothing = 2;
+  double imperfection_amplitude = 0;  ///< mm: nodes lie off the surface by up to this, at random
+  int imperfection_seed = 1;
 };
 
 struct SourceScene {
@@ -145,6 +148,20 @@ struct PreStretchScene {
   std::optional<Vec3> direction;  ///< of λ₁, projected to the surface
 };
 
+/// Where a held part of the skin is moved to at a time.
+struct HeldKnot {
+  double time;        ///< s
+  Vec3 displacement;  ///< mm, of every node of the part, from its rest position
+};
+
+/// A part of the skin that is held through its whole thickness, whatever the rim does: still, or moved along
+/// a path.
+struct HeldScene {
+  std::string name;
+  Vec3 low, high;              ///< mm, corners of a box: the part is where the given surface lies in it
+  std::vector<HeldKnot> path;  ///< linear between knots, constant outside; empty = it stays
+};
+
 struct SkinScene {
   SurfaceScene surface;
   int order = 3;  ///< p
@@ -157,6 +174,7 @@ struct SkinScene {
   VolumeQuadrature volume = VolumeQuadrature::full;
   int contact_degree = 0;  ///< triangle degree on contact and ligament surfaces; 0 = max(10, 2p+2)
   RimCondition rim = RimCondition::clamped;
+  std::vector<HeldScene> held;
   std::optional<PreStretchScene> pre_stretch;
   std::vector<LayerScene> layers;  ///< inner to outer
 };

@@ -30,7 +30,11 @@ SceneModel::SceneModel(Scene scene) : scene_(std::move(scene)) {
   const NativeBlock& last = model_.native_blocks.back();
   model_.native.resize(last.offset + last.size);
   for (const auto& part : parts_) part->add_terms(scene_, model_, features_);
-  model_.constraints = rim_constraints(model_.mesh, scene_.skin.rim);
+  model_.constraints = skin_constraints(model_.mesh, scene_.skin, scene_.file);
+  if (!scene_.skin.held.empty())
+    features_.push_back({"held parts", true,
+                         std::to_string(scene_.skin.held.size()) + " parts, of these " +
+                             std::to_string(model_.constraints.moved.size()) + " moved"});
   if (scene_.skin.rim == RimCondition::sliding)
     features_.push_back({"sliding rim", true,
                          std::to_string(model_.mesh.rim_columns.size()) + " columns, of these " +

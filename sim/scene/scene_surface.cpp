@@ -64,6 +64,7 @@ TriangleSurface scene_surface(const SurfaceScene& s) {
   if (s.coincident == "join" || (s.coincident == "auto" && has_seams)) join_coincident_vertices(mesh);
   mesh = cropped(std::move(mesh), s);
   if (s.coincident == "auto") refuse_coincident_vertices(mesh);
+  if (s.subdivide > 0) return subdivide_surface(mesh, s.subdivide);
   return mesh;
 }
 

@@ -206,6 +206,16 @@ void require_direction(const LocatedJson& scene, const json& holder, const std::
                      "a vector that is not zero");
 }
 
+void require_box(const LocatedJson& scene, const json& box, const std::string& at, bool may_be_flat) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double low = box["low"][axis], high = box["high"][axis];
+    if (low > high || (low == high && !may_be_flat))
+      throw InputError(scene.where(at) + ": " + at,
+                       shown_json(box["low"]) + " and " + shown_json(box["high"]),
+                       "low below high in every coordinate");
+  }
+}
+
 void check_crop(const LocatedJson& scene) {
   const std::string at = "/skin/surface/crop";
   const json& surface = scene.json["skin"]["surface"];
@@ -218,11 +228,48 @@ void check_crop(const LocatedJson& scene) {
   if (count != 1)
     throw InputError(scene.where(at) + ": " + at, count == 0 ? "none of them" : given,
                      "exactly one of \"centre\", \"box\", \"vertices\" and \"vertices_file\"");
-  for (size_t axis = 0; crop.contains("box") && axis < 3; ++axis)
-    if (crop["box"]["low"][axis] >= crop["box"]["high"][axis])
-      throw InputError(scene.where(at + "/box") + ": " + at + "/box",
-                       shown_json(crop["box"]["low"]) + " and " + shown_json(crop["box"]["high"]),
-                       "low below high in every coordinate");
+  if (crop.contains("box")) require_box(scene, crop["box"], at + "/box", false);
+}
+
+/// Knots of a path in the order of time. `at` by number, `shown` by name.
+void require_increasing_times(const LocatedJson& scene, const json& moved, const std::string& at,
+                              const std::string& shown) {
+  const json& path = moved["path"];
+  for (size_t k = 1; k < path.size(); ++k)
+    if (path[k]["time"].get<double>() <= path[k - 1]["time"].get<double>()) {
+      const std::string number = "/path/" + std::to_string(k) + "/time";
+      throw InputError(
+          scene.where(at + number) + ": " + shown + number, shown_json(path[k]["time"]),
+          "a time later than that of the knot before, " + shown_json(path[k - 1]["time"]) + " s");
+    }
+}
+
+/// A value per vertex of the file says nothing of the vertices that subdivision makes.
+void check_subdivision(const LocatedJson& scene) {
+  const json& root = scene.json;
+  const json& surface = root["skin"]["surface"];
+  if (!surface.contains("subdivide") || surface["subdivide"] == 0) return;
+  const auto refuse = [&scene](const std::string& at) {
+    throw InputError(scene.where(at) + ": " + at, "values per vertex of a surface that is subdivided",
+                     "no /skin/surface/subdivide, or a constant");
+  };
+  for (size_t i = 0; i < root["skin"]["layers"].size(); ++i)
+    if (root["skin"]["layers"][i].contains("thickness_map"))
+      refuse("/skin/layers/" + std::to_string(i) + "/thickness_map");
+  if (root.contains("ligaments") && root["ligaments"].contains("map")) refuse("/ligaments/map");
+}
+
+void check_held(const LocatedJson& scene) {
+  const json& skin = scene.json["skin"];
+  if (!skin.contains("held")) return;
+  require_unique_names(scene, skin["held"], "/skin/held");
+  for (size_t i = 0; i < skin["held"].size(); ++i) {
+    const json& held = skin["held"][i];
+    const std::string at = "/skin/held/" + std::to_string(i);
+    require_box(scene, held["box"], at + "/box", true);
+    if (held.contains("path"))
+      require_increasing_times(scene, held, at, "/skin/held/" + escape_key(held["name"].get<std::string>()));
+  }
 }
 
 /// Quadrature keys that exclude each other, the direction of a pre-stretch.
@@ -276,6 +323,8 @@ void check_consistency(const LocatedJson& scene) {
   require_unique_names(scene, root["colliders"], "/colliders");
 
   check_skin(scene);
+  check_held(scene);
+  check_subdivision(scene);
   if (root.contains("base")) {
     const json& base = root["base"];
     require_direction(scene, base, "/base", "normal");
@@ -293,16 +342,8 @@ void check_consistency(const LocatedJson& scene) {
     require_direction(scene, collider, at, "axis");
     if (collider["shape"] == "ellipsoid") require_semi_axes(scene, collider["semi_axes"], at + "/semi_axes");
     if (!collider.contains("path")) continue;
-    const json& path = collider["path"];
-    for (size_t k = 1; k < path.size(); ++k)
-      if (path[k]["time"].get<double>() <= path[k - 1]["time"].get<double>()) {
-        const std::string number = "/path/" + std::to_string(k) + "/time";
-        throw InputError(
-            scene.where("/colliders/" + std::to_string(i) + number) + ": /colliders/" +
-                escape_key(collider["name"].get<std::string>()) + number,
-            shown_json(path[k]["time"]),
-            "a time later than that of the knot before, " + shown_json(path[k - 1]["time"]) + " s");
-      }
+    require_increasing_times(scene, collider, at,
+                             "/colliders/" + escape_key(collider["name"].get<std::string>()));
   }
 }
 

@@ -37,6 +37,17 @@ State Model::rest_state() const {
   return {0, VectorXd::Zero(3 * num_nodes()), VectorXd::Zero(static_cast<Eigen::Index>(history_size_)), {}};
 }
 
+VectorXd Model::given_displacement(double t) const {
+  if (constraints.moved.empty()) return {};
+  VectorXd u = VectorXd::Zero(3 * num_nodes());
+  for (const MovedNodes& part : constraints.moved) {
+    Vec3 displacement = Vec3::Zero();
+    for (const KnotWeight& w : part.path.weights(t)) displacement += w.weight * part.displacements[w.knot];
+    for (const int node : part.nodes) u.segment<3>(3 * node) = displacement;
+  }
+  return u;
+}
+
 std::vector<int> Model::penalties() const {
   std::vector<int> indices;
   for (const NativeBlock& block : native_blocks)
@@ -88,14 +99,28 @@ VectorXd Model::to_displacement(const VectorXd& q) const {
 }
 
 StepProblem::StepProblem(const Model& model, const VectorXd& native, const StepInfo& step, const State& old)
-    : model_(&model), native_(&native), step_(step), old_(&old), data_(model.terms.size()) {
+    : model_(&model),
+      native_(&native),
+      step_(step),
+      old_(&old),
+      data_(model.terms.size()),
+      given_(model.given_displacement(step.t)) {
   require(step.dt() > 0, "StepProblem: the step's dt must be positive");
   for (std::size_t k = 0; k < model.terms.size(); ++k)
     model.terms[k].prepare(step_, native, old.u, old.history.data() + model.history_offset(k), data_[k]);
 }
 
+VectorXd StepProblem::displacement(const VectorXd& q) const {
+  VectorXd u = model_->to_displacement(q);
+  if (given_.size() > 0) u += given_;
+  return u;
+}
+
 double StepProblem::energy(const VectorXd& q, VectorXd* gradient) {
-  const VectorXd u = model_->to_displacement(q);
+  return energy_at(displacement(q), gradient);
+}
+
+double StepProblem::energy_at(const VectorXd& u, VectorXd* gradient) {
   VectorXd g, absolute;
   if (gradient) g = absolute = VectorXd::Zero(u.size());
   double total = 0;
@@ -159,7 +184,10 @@ class FramedSink final : public Term::MatrixSink {
 }  // namespace
 
 void StepProblem::hessian(const VectorXd& q, Curvature curvature, BlockMatrix& out) {
-  const VectorXd u = model_->to_displacement(q);
+  hessian_at(displacement(q), curvature, out);
+}
+
+void StepProblem::hessian_at(const VectorXd& u, Curvature curvature, BlockMatrix& out) {
   out.set_zero();
   FramedSink sink(model_->constraints, out);
   for (std::size_t k = 0; k < data_.size(); ++k)
@@ -174,8 +202,28 @@ VectorXd StepProblem::first_guess() {
   return energy(moved, nullptr) < energy(held, nullptr) ? moved : held;
 }
 
+VectorXd StepProblem::response_to_given_motion(CholeskyFactor& factor, BlockMatrix& matrix) {
+  // Far below every thickness, so that the difference of forces is linear; far above rounding.
+  constexpr double kSmallMotion = 1e-4;  // mm
+  if (given_.size() == 0) return {};
+  VectorXd motion = given_;
+  for (const MovedNodes& part : model_->constraints.moved)
+    for (const int node : part.nodes) motion.segment<3>(3 * node) -= old_->u.segment<3>(3 * node);
+  const double largest = motion.cwiseAbs().maxCoeff();
+  if (largest == 0) return {};
+  const double scale = std::min(1., kSmallMotion / largest);
+  VectorXd ahead, behind;
+  if (!std::isfinite(energy_at(old_->u + scale * motion, &ahead)) ||
+      !std::isfinite(energy_at(old_->u - scale * motion, &behind)))
+    return {};
+  hessian_at(old_->u, Curvature::projected, matrix);
+  if (!factor.factorize(matrix)) return {};
+  const VectorXd forces = (ahead - behind) / (2 * scale);
+  return model_->to_unknowns(old_->u) - VectorXd(factor.solve(forces));
+}
+
 double StepProblem::largest_feasible_step(const VectorXd& q, const VectorXd& d) {
-  const VectorXd u = model_->to_displacement(q), du = model_->to_displacement(d);
+  const VectorXd u = displacement(q), du = model_->to_displacement(d);
   double smallest = std::numeric_limits<double>::infinity();
   for (const Term& term : model_->terms) smallest = std::min(smallest, term.feasible_step(u, du));
   return smallest;

@@ -12,6 +12,7 @@
 #include "sim/mesh/skin_mesh.h"
 #include "sim/solve/objective.h"
 #include "sim/surface/implicit_shape.h"
+#include "sim/terms/path.h"
 #include "sim/terms/term.h"
 #include "sim/time/state.h"
 
@@ -25,13 +26,21 @@ struct NativeBlock {
   std::vector<int> stiffness_like;  ///< indices into the native vector
 };
 
+/// Nodes that are moved together, by a displacement given over time. They are fully fixed (no block).
+struct MovedNodes {
+  std::vector<int> nodes;
+  KnotPath path;
+  std::vector<Vec3> displacements;  ///< [knots] mm
+};
+
 /// Per node: which of its components are unknowns.
 struct Constraints {
-  std::vector<int> block;           ///< [num_nodes] block index, −1 = fully fixed at zero displacement
+  std::vector<int> block;           ///< [num_nodes] block index, −1 = fully fixed: at zero, or moved
   std::vector<int> block_nodes;     ///< [num_blocks] node
   std::vector<Mat3> frames;         ///< per framed block: columns are the frame's axes
   std::vector<int> frame_of_block;  ///< [num_blocks] index into frames, −1 = identity
   std::vector<int> fixed_unknowns;  ///< unknowns q that stay zero
+  std::vector<MovedNodes> moved;
 };
 
 class Model {
@@ -52,12 +61,15 @@ class Model {
   std::size_t history_offset(std::size_t term) const { return history_offsets_[term]; }
   /// The rest state: zero displacement, C^v = I, no lagged pressure.
   State rest_state() const;
+  /// Displacement of the moved nodes at time t and zero elsewhere [num_nodes·3], mm; empty when no node is
+  /// moved.
+  VectorXd given_displacement(double t) const;
   /// Native parameters that are contact penalties κ.
   std::vector<int> penalties() const;
   const NativeBlock& native_block(const std::string& name) const;  ///< throws ContractError when absent
 
   /// Unknowns from displacements and back (a gradient maps like a displacement; fixed components read as
-  /// zero).
+  /// zero, those of moved nodes too: StepProblem::displacement adds them).
   VectorXd to_unknowns(const VectorXd& u) const;
   VectorXd to_displacement(const VectorXd& q) const;
   /// Same for k columns at once, [num_nodes·3][k] → [num_unknowns][k].
@@ -81,6 +93,13 @@ class StepProblem final : public Objective {
   void hessian(const VectorXd& q, Curvature curvature, BlockMatrix& out) override;
   double largest_feasible_step(const VectorXd& q, const VectorXd& d) override;
 
+  /// Displacement of all nodes at the step's end for unknowns q, moved nodes included.
+  VectorXd displacement(const VectorXd& q) const;
+  /// Energy, gradient by unknowns (when asked and finite) and Hessian where the skin has displacement u,
+  /// which need not agree with where the step moves its nodes.
+  double energy_at(const VectorXd& u, VectorXd* gradient);
+  void hessian_at(const VectorXd& u, Curvature curvature, BlockMatrix& out);
+
   const Model& model() const { return *model_; }
   const VectorXd& native() const { return *native_; }
   const StepInfo& step() const { return step_; }
@@ -96,6 +115,10 @@ class StepProblem final : public Objective {
   /// is lower there (on drags it halves the iterations; where a finger turns or stops, the energy refuses
   /// it).
   VectorXd first_guess();
+  /// When the step moves nodes: the old displacement and the skin's linear response to that motion, by one
+  /// solve with the projected Hessian at the old state. Empty when nothing is moved or there is no such
+  /// factor.
+  VectorXd response_to_given_motion(CholeskyFactor& factor, BlockMatrix& matrix);
   /// The old state with the lag (pressure and normal of friction) that the step would leave if it ended at u:
   /// what another pass over the same step starts from.
   State relagged(const VectorXd& u) const;
@@ -108,6 +131,7 @@ class StepProblem final : public Objective {
   StepInfo step_;
   const State* old_;
   std::vector<TermStepData> data_;
+  VectorXd given_;  ///< Model::given_displacement at the step's end
   double force_scale_ = 0;
 };
 

@@ -32,6 +32,11 @@ MinimiserReport StepSolver::solve(const StepInfo& step, const State& old, const 
                                   const IterationCallback& callback) {
   problem_.emplace(*model_, *native_, step, old);
   VectorXd q = start ? model_->to_unknowns(*start) : problem_->first_guess();
+  if (!start && !model_->constraints.moved.empty()) {
+    const VectorXd response = problem_->response_to_given_motion(factor_, matrix_);
+    if (response.size() > 0 && problem_->energy(response, nullptr) < problem_->energy(q, nullptr))
+      q = response;
+  }
   const VectorXd held = start ? q : model_->to_unknowns(old.u);
   MinimiserReport first = solve_pass(q, held, callback);
   return solve_later_passes(step, std::move(first), std::move(q), held, callback);
@@ -50,7 +55,7 @@ MinimiserReport StepSolver::solve_later_passes(const StepInfo& step, MinimiserRe
   earlier_.clear();
   MinimiserReport total = std::move(first);
   for (int pass = 1;; ++pass) {
-    u_ = model_->to_displacement(q);
+    u_ = problem_->displacement(q);
     if (!total.converged() || pass >= passes_) return total;
     State next = problem_->relagged(u_);
     earlier_.push_back(u_);

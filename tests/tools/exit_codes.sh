@@ -26,12 +26,13 @@ expect 0 0 '^rhytid.* [0-9]+\.[0-9]+\.[0-9]+ ' --version
 expect 0 0 'doctor' --help
 expect 0 0 '^Example' doctor --help
 expect 0 0 '"\$schema"' schema
+expect 0 0 '"title": "Rhytid experiment"' schema experiment
 expect 0 0 '^# The scene file' schema --docs
 expect 2 1 "^rhytid: error: schema: got 'nonsense', expected one of scene" schema nonsense
 case $(basename "$program") in
   rhytid) expect 0 0 '"title": "Rhytid case"' schema case
     expect 0 0 '`/fit/parameters/\*/address` \| string' schema case --docs ;;
-  *) expect 2 1 "^rhytid: error: schema: got 'case', expected one of scene$" schema case ;;
+  *) expect 2 1 "^rhytid: error: schema: got 'case', expected one of scene, experiment$" schema case ;;
 esac
 expect 2 1 '^rhytid: error: verb: got nothing'
 expect 2 1 "^rhytid: error: verb: got 'no-such-verb', expected one of .*doctor" no-such-verb

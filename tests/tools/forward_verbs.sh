@@ -127,4 +127,15 @@ for file in heatmap.vtp heatmap.ply heatmap.csv heatmap.png weight_a.png weight_
   [ -s heat/$file ] || fail "heatmap did not write $file"
 done
 head -1 heat/heatmap.csv | grep -q 'column,x_mm,y_mm,z_mm,b_per_mm,weight_a,weight_b' || fail "heatmap.csv header"
+cat >experiment.json <<'EXPERIMENT'
+{
+  "scene": "tiny.json",
+  "measure": {"line": {"from": [-5, 0, 0], "to": [5, 0, 0], "points": 50}},
+  "variants": [{"name": "soft"}, {"name": "firm", "settings": ["/skin/layers/soft/youngs_modulus=60 kPa"]}]
+}
+EXPERIMENT
+expect 2 1 "^rhytid: error: --only: got 'no', expected one of soft, firm$" study sweep experiment.json -o sweep --only no
+expect 0 any '^written to sweep: results.csv' study sweep experiment.json -o sweep --threads 1
+[ "$(wc -l <sweep/results.csv)" = 3 ] || fail "rows of sweep/results.csv"
+expect 0 any 'firm: complete before, kept' study sweep experiment.json -o sweep --threads 1
 exit $((failures > 0))

@@ -66,7 +66,7 @@ TEST(BundledScenes, head_rests_in_equilibrium) {
   if (!folder) GTEST_SKIP() << "RHYTID_REALDATA is not set: no real head to read";
   const std::string head = std::string(folder) + "/heads/ict_facekit/generic_neutral_mesh.obj";
   if (!std::filesystem::exists(head)) GTEST_SKIP() << head << " does not exist";
-  for (const std::string name : {"head_forehead", "head_fit"}) {
+  for (const std::string name : {"head_forehead", "head_fit", "head_forehead_drag", "head_temple_drag"}) {
     const SceneModel scene_model(
         load_scene(source_dir() + "/data/scenes/" + name + "/scene.json", {"/skin/surface/file=" + head}));
     const StepCost cost = measure_step_cost(scene_model);

@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 
+#include "sim/core/error.h"
+
 namespace rhytid {
 
 std::vector<int> rim_corners(const SkinMesh& mesh) {
@@ -11,8 +13,56 @@ std::vector<int> rim_corners(const SkinMesh& mesh) {
   return corners;
 }
 
-Constraints rim_constraints(const SkinMesh& mesh, RimCondition condition) {
+namespace {
+
+/// Columns of each held part, ascending.
+std::vector<int> columns_in(const SkinMesh& mesh, const SkinScene& skin, const HeldScene& held) {
+  std::vector<int> columns;
+  const int level = skin.surface.is_outer ? mesh.num_levels - 1 : 0;
+  // Coordinates of nodes carry rounding: a box that ends at them holds them.
+  const Vec3 room =
+      Vec3::Constant(1e-9 * mesh.rest.cwiseAbs().maxCoeff() + skin.surface.imperfection_amplitude);
+  for (int column = 0; column < mesh.num_columns; ++column) {
+    const Vec3 x = mesh.rest.row(mesh.node(column, level)).transpose();
+    if (((x - held.low + room).array() >= 0).all() && ((held.high - x + room).array() >= 0).all())
+      columns.push_back(column);
+  }
+  return columns;
+}
+
+/// Whether a column is fixed by a held part; adds the moved parts.
+std::vector<bool> held_columns(const SkinMesh& mesh, const SkinScene& skin, const std::string& file,
+                               std::vector<MovedNodes>& moved) {
+  std::vector<bool> is_held(mesh.num_columns, false);
+  for (const HeldScene& held : skin.held) {
+    const std::string at = file + ": /skin/held/" + held.name;
+    const std::vector<int> columns = columns_in(mesh, skin, held);
+    if (columns.empty()) throw InputError(at + "/box", "a box without nodes", "one that holds some");
+    std::vector<int> nodes;
+    for (const int column : columns) {
+      if (is_held[column])
+        throw InputError(at + "/box", "nodes that another held part has", "parts without common nodes");
+      is_held[column] = true;
+      for (int level = 0; level < mesh.num_levels; ++level) nodes.push_back(mesh.node(column, level));
+    }
+    if (held.path.empty()) continue;
+    std::vector<double> times;
+    std::vector<Vec3> displacements;
+    for (const HeldKnot& knot : held.path) {
+      times.push_back(knot.time);
+      displacements.push_back(knot.displacement);
+    }
+    moved.push_back({std::move(nodes), KnotPath(std::move(times)), std::move(displacements)});
+  }
+  return is_held;
+}
+
+}  // namespace
+
+Constraints skin_constraints(const SkinMesh& mesh, const SkinScene& skin, const std::string& file) {
+  const RimCondition condition = skin.rim;
   Constraints c;
+  const std::vector<bool> is_held = held_columns(mesh, skin, file, c.moved);
   std::vector<int> rim_index(mesh.num_columns, -1);
   if (condition != RimCondition::free)
     for (std::size_t r = 0; r < mesh.rim_columns.size(); ++r)
@@ -20,7 +70,7 @@ Constraints rim_constraints(const SkinMesh& mesh, RimCondition condition) {
   c.block.assign(mesh.num_nodes(), -1);
   for (int column = 0; column < mesh.num_columns; ++column) {
     const int rim = rim_index[column];
-    if (rim >= 0 && condition == RimCondition::clamped) continue;
+    if (is_held[column] || (rim >= 0 && condition == RimCondition::clamped)) continue;
     int frame = -1;
     if (rim >= 0) {
       // Sliding: the wall of the rim only moves within itself. First axis = outward conormal, fixed. At a

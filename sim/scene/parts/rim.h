@@ -13,10 +13,12 @@ namespace rhytid {
 /// and 11-gon: polygons with fewer sides have corners, finer ones are round rims.
 inline constexpr double kCornerTurn = 35 * std::numbers::pi / 180;  // rad
 
-/// Blocks of unknowns and what is held on the rim: `clamped` nothing moves; `sliding` the wall of the rim
+/// Blocks of unknowns and what is held. On the rim: `clamped` nothing moves; `sliding` the wall of the rim
 /// stays in its plane (outward conormal held), and a corner stays in both of its walls (both in-plane
-/// directions held, only the thickness direction is free); `free` nothing is held.
-Constraints rim_constraints(const SkinMesh& mesh, RimCondition condition);
+/// directions held, only the thickness direction is free); `free` nothing is held. Columns of the parts in
+/// skin.held are fixed, or moved along the part's path. Throws InputError naming `file` for a part without
+/// nodes, or two parts that share some.
+Constraints skin_constraints(const SkinMesh& mesh, const SkinScene& skin, const std::string& file);
 
 /// Rim columns that are corners, ascending.
 std::vector<int> rim_corners(const SkinMesh& mesh);

@@ -94,7 +94,10 @@ SkinMesh build_skin_mesh(const Scene& scene) {
   options.surface_is_outer = skin.surface.is_outer;
   options.normal_smoothing = skin.surface.normal_smoothing;
   options.bend_radius = skin.surface.bend_radius;
-  return extrude(surface, options);
+  SkinMesh mesh = extrude(surface, options);
+  if (skin.surface.imperfection_amplitude > 0)
+    add_imperfection(mesh, skin.surface.imperfection_amplitude, skin.surface.imperfection_seed);
+  return mesh;
 }
 
 void SkinPart::add_native_blocks(const Scene& scene, Model& model) const {

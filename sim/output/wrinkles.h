@@ -1,0 +1,73 @@
+// What a wrinkled surface shows: numbers from heights h, the displacement along the rest normals, sampled at
+// equal spacing along a line or on a rectangular grid.
+//
+// Heights are band-passed first, so that the dent of a finger and the curvature of a face are not counted:
+//   b = (S_short − S_long) h,   S_L: local linear fit with Gaussian weights of standard deviation σ,
+//                               half of a wave of length L passes:  exp(−½ (2π σ/L)²) = ½
+// which is linear in h and hence in the displacements, and gives exactly zero for a plane.
+//
+// Descriptors come from a few integrals of b, exact for a train of plane waves A sin(k·x):
+//   amplitude    A = (4/3 · ∫b⁴/∫b²)^½
+//   wavelength   λ = 2π (∫b²/∫|∇b|²)^½
+//   extent       length or area of the train:  3/2 · (∫b²)²/∫b⁴
+//   direction    of k: main axis of ∫∇b ∇bᵀ;  coherence: (t₁ − t₂)/(t₁ + t₂) of its eigenvalues
+// They are smooth functions of the displacements wherever b is not zero (counts are not).
+//
+// Units   mm, rad.   Tests   tests/sim/output/test_wrinkles.cpp
+#pragma once
+
+#include <limits>
+
+#include "sim/core/types.h"
+
+namespace rhytid {
+
+/// Wavelengths that count as wrinkles, mm. Outside they fade away.
+struct WrinkleBand {
+  double shortest = 0;                                       ///< 0 = no smoothing
+  double longest = std::numeric_limits<double>::infinity();  ///< inf = nothing is taken away
+  void validate() const;                                     ///< throws ContractError
+};
+
+/// Standard deviation of the Gaussian that halves waves of this length, mm.
+double half_pass_deviation(double wavelength);
+
+/// Band-passed heights along a line, [n]. Linear in the heights.
+VectorXd band_pass(const VectorXd& heights, double spacing, const WrinkleBand& band);
+
+/// The same on a grid [nx][ny]; NaN marks points that are not on the surface, there and nowhere else the
+/// result is NaN too.
+MatrixXd band_pass(const MatrixXd& heights, double spacing, const WrinkleBand& band);
+
+/// The integrals that descriptors are made of.
+struct WrinkleSums {
+  double square = 0, fourth = 0;                       ///< ∫b², ∫b⁴
+  Eigen::Matrix2d gradient = Eigen::Matrix2d::Zero();  ///< ∫∇b ∇bᵀ; along a line only (0, 0)
+};
+WrinkleSums wrinkle_sums(const VectorXd& band_passed, double spacing);
+/// Points whose derivatives need one that is not on the surface do not count.
+WrinkleSums wrinkle_sums(const MatrixXd& band_passed, double spacing);
+
+struct WrinkleDescriptors {
+  double amplitude = 0;   ///< mm
+  double wavelength = 0;  ///< mm
+  double extent = 0;      ///< mm along a line, mm² on a grid
+  double direction =
+      0;  ///< of the wave vector against the first axis, rad in (−π/2, π/2]; crests run across it
+  double coherence = 0;  ///< 0: waves in all directions, 1: in one
+};
+/// All zero for a surface without wrinkles.
+WrinkleDescriptors describe(const WrinkleSums& sums);
+
+/// Counts along a line. They jump where descriptors do not.
+struct WrinkleCount {
+  int crests =
+      0;  ///< maxima that rise from both sides by at least `prominence` × (largest − smallest height)
+  int sign_changes =
+      0;  ///< of heights beyond 2 % of the largest |height|: one for every half wave but the first
+  double crest_spacing = 0;  ///< mean distance between neighbouring crests, mm; 0 with fewer than two
+  double largest = 0;        ///< half of largest − smallest height, mm
+};
+WrinkleCount count_wrinkles(const VectorXd& heights, double spacing, double prominence = 0.08);
+
+}  // namespace rhytid

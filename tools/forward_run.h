@@ -1,0 +1,31 @@
+// A forward run with its files: what `simulate` does, and what a study does for each of its variants.
+#pragma once
+
+#include <string>
+
+#include "sim/scene/scene_model.h"
+#include "tools/frame_writer.h"
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+
+/// Someone who measures a run frame by frame. Of start and resume one is called, after begin.
+class FrameListener {
+ public:
+  virtual ~FrameListener() = default;
+  /// The run is ready to go. The model lives as long as the run.
+  virtual void begin(const SceneModel& scene_model, const std::string& folder) = 0;
+  /// It starts at rest.
+  virtual void start(const State& rest) = 0;
+  /// It goes on after this frame.
+  virtual void resume(int frame) = 0;
+  /// A frame is done; called before the checkpoint that resume starts from. Frame 0 only after settling.
+  virtual void frame(int frame, const State& state) = 0;
+};
+
+/// Runs the scene of context.options with its settings and leaves the files that `rhytid simulate --help`
+/// names in the output folder. Throws InputError.
+ExitCode run_forward(VerbContext& context, const FrameOptions& options, bool resume,
+                     FrameListener* listener = nullptr);
+
+}  // namespace rhytid::tools

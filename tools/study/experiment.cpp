@@ -1,0 +1,225 @@
+#include "tools/study/experiment.h"
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <set>
+
+#include "sim/core/error.h"
+#include "sim/scene/located_json.h"
+#include "sim/scene/schema.h"
+#include "sim/scene/validate.h"
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+namespace {
+
+using nlohmann::json;
+
+Rule settings_rule(const std::string& pointer, const std::string& doc) {
+  return {.pointer = pointer, .type = RuleType::array, .fallback = json::array(), .doc = doc};
+}
+
+Rule text_rule(const std::string& pointer) {
+  return {.pointer = pointer, .type = RuleType::string, .doc = "One change."};
+}
+
+Vec3 vector_of(const json& j) {
+  return {j[0].get<double>(), j[1].get<double>(), j[2].get<double>()};
+}
+
+WrinkleMeasure read_measure(const json& j) {
+  WrinkleMeasure m;
+  if (j.contains("wavelengths")) m.band = {j["wavelengths"][0], j["wavelengths"][1]};
+  if (j.contains("line")) {
+    m.line = SampleLine{vector_of(j["line"]["from"]), vector_of(j["line"]["to"])};
+    m.line_points = j["line"]["points"];
+  }
+  if (j.contains("window")) {
+    const json& w = j["window"];
+    m.window = SampleWindow{vector_of(w["centre"]),
+                            vector_of(w["along"]),
+                            vector_of(w["normal"]),
+                            {w["size"][0].get<double>(), w["size"][1].get<double>()}};
+    m.window_spacing = w["spacing"];
+  }
+  return m;
+}
+
+/// What no single rule can say.
+void check(const LocatedJson& located) {
+  const json& root = located.json;
+  const auto refuse = [&](const std::string& at, const std::string& got, const std::string& expected) {
+    throw InputError(located.where(at) + ": " + at, got, expected);
+  };
+  std::set<std::string> seen;
+  for (std::size_t i = 0; i < root["variants"].size(); ++i) {
+    const std::string name = root["variants"][i]["name"];
+    const std::string at = "/variants/" + std::to_string(i) + "/name";
+    if (!seen.insert(name).second)
+      refuse(at, shown_json(name) + " a second time", "a name of its own for each");
+    // It becomes the name of a folder beside the tables.
+    if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+.") !=
+            std::string::npos ||
+        name.front() == '.')
+      refuse(at, shown_json(name), "letters, digits, _ - + and dots");
+  }
+  const json& measure = root["measure"];
+  if (measure.contains("wavelengths") && measure["wavelengths"][0] >= measure["wavelengths"][1])
+    refuse("/measure/wavelengths", shown_json(measure["wavelengths"]), "the shorter one first");
+  if (measure.contains("line") && measure["line"]["from"] == measure["line"]["to"])
+    refuse("/measure/line", "the same point twice", "two ends");
+  if (measure.contains("window")) {
+    const json& w = measure["window"];
+    const Vec3 along = vector_of(w["along"]), normal = vector_of(w["normal"]);
+    if (!(along.cross(normal).norm() > 1e-6 * along.norm() * normal.norm()))
+      refuse("/measure/window", shown_json(w["along"]) + " and " + shown_json(w["normal"]),
+             "two directions that span a plane");
+    if (std::min(w["size"][0].get<double>(), w["size"][1].get<double>()) < 2 * w["spacing"].get<double>())
+      refuse("/measure/window/size", shown_json(w["size"]), "at least twice the spacing");
+  }
+}
+
+const RuleNode& rule_tree() {
+  static const RuleNode root = build_rule_tree(experiment_rules());
+  return root;
+}
+
+}  // namespace
+
+const char* name(StudySize size) {
+  return size == StudySize::quick ? "quick" : "full";
+}
+
+const std::vector<Rule>& experiment_rules() {
+  const WrinkleMeasure m;
+  static const std::vector<Rule> rules = {
+      {.pointer = "", .type = RuleType::object, .is_required = true, .doc = "An experiment."},
+      {.pointer = "/$schema", .type = RuleType::string, .doc = "For editors; ignored."},
+      {.pointer = "/name", .type = RuleType::string, .fallback = "", .doc = "Short name."},
+      {.pointer = "/description", .type = RuleType::string, .fallback = "", .doc = "What it shows."},
+      {.pointer = "/scene", .type = RuleType::path, .is_required = true, .doc = "Scene of all variants."},
+      settings_rule("/settings", "Changes of that scene, \"/pointer=value\", for all variants."),
+      text_rule("/settings/*"),
+      settings_rule("/quick", "Further changes at the quick size."),
+      text_rule("/quick/*"),
+      settings_rule("/full", "Further changes at the full size."),
+      text_rule("/full/*"),
+      {.pointer = "/measure",
+       .type = RuleType::object,
+       .fallback = json::object(),
+       .doc = "Where wrinkles are measured, on the outer surface, from displacements along its normals."},
+      {.pointer = "/measure/wavelengths",
+       .type = RuleType::vector2,
+       .dimension = dimension::length,
+       .min = 0,
+       .doc = "What counts as a wrinkle: waves between these lengths; without it nothing is filtered."},
+      {.pointer = "/measure/line", .type = RuleType::object, .doc = "A line on the surface at rest."},
+      {.pointer = "/measure/line/from",
+       .type = RuleType::vector3,
+       .dimension = dimension::length,
+       .is_required = true,
+       .doc = "One end; moved to the surface."},
+      {.pointer = "/measure/line/to",
+       .type = RuleType::vector3,
+       .dimension = dimension::length,
+       .is_required = true,
+       .doc = "The other."},
+      {.pointer = "/measure/line/points",
+       .type = RuleType::integer,
+       .fallback = m.line_points,
+       .min = 3,
+       .max = 100000,
+       .doc = "Points along it."},
+      {.pointer = "/measure/window", .type = RuleType::object, .doc = "A rectangle on the surface at rest."},
+      {.pointer = "/measure/window/centre",
+       .type = RuleType::vector3,
+       .dimension = dimension::length,
+       .is_required = true,
+       .doc = "Its centre; its points are moved to the surface."},
+      {.pointer = "/measure/window/along",
+       .type = RuleType::vector3,
+       .fallback = {1, 0, 0},
+       .doc = "Direction of its first side."},
+      {.pointer = "/measure/window/normal",
+       .type = RuleType::vector3,
+       .fallback = {0, 0, 1},
+       .doc = "Outward direction."},
+      {.pointer = "/measure/window/size",
+       .type = RuleType::vector2,
+       .dimension = dimension::length,
+       .is_required = true,
+       .min = 0,
+       .min_is_open = true,
+       .doc = "Lengths of its sides."},
+      {.pointer = "/measure/window/spacing",
+       .dimension = dimension::length,
+       .fallback = m.window_spacing,
+       .min = 0,
+       .min_is_open = true,
+       .doc = "Between points."},
+      {.pointer = "/variants",
+       .type = RuleType::array,
+       .is_required = true,
+       .min = 1,
+       .doc = "What is run, in this order."},
+      {.pointer = "/variants/*", .type = RuleType::object, .doc = "One variant."},
+      {.pointer = "/variants/*/name",
+       .type = RuleType::name,
+       .is_required = true,
+       .doc = "Unique; the name of its folder."},
+      {.pointer = "/variants/*/size",
+       .type = RuleType::option,
+       .fallback = "both",
+       .options = {"both", "quick", "full"},
+       .doc = "At which size it is run."},
+      settings_rule("/variants/*/settings", "Its changes of the scene."),
+      text_rule("/variants/*/settings/*"),
+      settings_rule("/variants/*/quick", "Further changes at the quick size."),
+      text_rule("/variants/*/quick/*"),
+      settings_rule("/variants/*/full", "Further changes at the full size."),
+      text_rule("/variants/*/full/*"),
+  };
+  return rules;
+}
+
+nlohmann::json experiment_schema() {
+  return format_schema(rule_tree(), "experiment");
+}
+
+std::string experiment_documentation() {
+  return format_documentation(experiment_rules(), rule_tree(), "experiment", R"(# Experiment files
+
+An experiment is JSON with comments: a scene, the variants of it that `rhytid study sweep` runs side by side, and where
+their wrinkles are measured. Settings are those of `--set`; later ones win: of the experiment, of the size, of the
+variant, of the variant at the size, of the command line. `rhytid schema` describes scenes.
+)");
+}
+
+Experiment load_experiment(const std::string& path, StudySize size) {
+  const LocatedJson written = read_with_extends(path, rule_tree());
+  const LocatedJson located = resolve_against_rules(written, rule_tree());
+  check(located);
+  const json& root = located.json;
+  Experiment e;
+  e.file = path;
+  e.name = root["name"], e.description = root["description"], e.scene = root["scene"];
+  if (e.name.empty()) e.name = std::filesystem::path(path).stem().string();
+  e.measure = read_measure(root["measure"]);
+  e.measure_json = root["measure"];
+  for (const json& v : root["variants"]) {
+    if (v["size"] != "both" && v["size"] != name(size)) continue;
+    Variant variant;
+    variant.name = v["name"];
+    for (const json* list : {&root["settings"], &root[name(size)], &v["settings"], &v[name(size)]})
+      for (const json& text : *list) {
+        check_setting(text.get<std::string>());
+        variant.settings.push_back(text);
+      }
+    e.variants.push_back(std::move(variant));
+  }
+  if (e.variants.empty())
+    throw InputError(path + ": /variants", std::string("none at the size ") + name(size), "at least one");
+  return e;
+}
+
+}  // namespace rhytid::tools

@@ -1,0 +1,52 @@
+// experiment.json: a scene, the variants of it that are run side by side, and what is measured on each.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/output/surface_samples.h"
+#include "sim/output/wrinkles.h"
+#include "sim/scene/rules.h"
+
+namespace rhytid::tools {
+
+enum class StudySize { quick, full };
+const char* name(StudySize size);
+
+/// Where and how wrinkles are measured.
+struct WrinkleMeasure {
+  WrinkleBand band;
+  std::optional<SampleLine> line;
+  int line_points = 400;
+  std::optional<SampleWindow> window;
+  double window_spacing = 0.5;  ///< mm
+};
+
+struct Variant {
+  std::string name;
+  std::vector<std::string>
+      settings;  ///< of the experiment, its size, the variant and its size, in this order
+};
+
+struct Experiment {
+  std::string name, description;
+  std::string file;   ///< experiment.json itself, for messages
+  std::string scene;  ///< resolved path
+  WrinkleMeasure measure;
+  nlohmann::json measure_json;    ///< `measure` with all defaults: what a result depends on
+  std::vector<Variant> variants;  ///< those of the size asked for
+};
+
+/// The rules of experiment.json.
+const std::vector<Rule>& experiment_rules();
+
+/// JSON Schema and Markdown of the format, for `rhytid schema experiment`.
+nlohmann::json experiment_schema();
+std::string experiment_documentation();
+
+/// Reads an experiment at a size. Throws InputError of one line.
+Experiment load_experiment(const std::string& path, StudySize size);
+
+}  // namespace rhytid::tools

@@ -1,0 +1,40 @@
+// What a sweep knows of one variant: variant.json in its folder, and the row of the tables.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace rhytid::tools {
+
+/// A column of the results with its unit, e.g. {"line_wavelength", "mm"}; the value is a number or empty.
+struct ResultColumn {
+  std::string name, unit;
+  std::optional<double> value;
+};
+
+struct VariantResult {
+  std::string name;
+  std::string identity;  ///< of scene, files, measure and program; another one means another variant
+  std::string status;    ///< running | complete | not_converged
+  std::string reason;    ///< a sentence when not complete
+  std::vector<ResultColumn> columns;
+
+  bool finished() const { return status == "complete" || status == "not_converged"; }
+};
+
+/// Reads variant.json; nothing when there is none, or none that this program can read.
+std::optional<VariantResult> read_variant(const std::string& folder);
+/// Writes it atomically. Throws InputError naming the path.
+void write_variant(const std::string& folder, const VariantResult& result);
+
+/// Reads the numbers of a run from the files it left in `folder`: sizes and times of run.json, sums, extremes
+/// and last values of steps.csv, last row of wrinkles.csv.
+std::vector<ResultColumn> read_results(const std::string& folder);
+
+/// A CSV of numbers as columns, in its own order. Throws InputError naming the path.
+std::vector<std::pair<std::string, std::vector<double>>> read_number_table(const std::string& path);
+
+}  // namespace rhytid::tools
