@@ -1,6 +1,7 @@
 #include "tools/frame_writer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -10,9 +11,12 @@
 #include "sim/output/surface_files.h"
 #include "sim/scene/collider_motion.h"
 #include "sim/terms/term.h"
+#include "tools/scene_argument.h"
 
 namespace rhytid::tools {
 namespace {
+
+constexpr int picture_samples = 2;  ///< per pixel and axis
 
 std::string numbered(const char* pattern, int frame) {
   char text[64];
@@ -74,7 +78,7 @@ FrameWriter::FrameWriter(const SceneModel& scene_model, std::string folder, cons
   picture_.height = options.picture_height;
   const MatrixX3 normals = outer_.smooth_normals({});
   const Vec3 mean_normal = normals.colwise().sum().transpose().normalized();
-  picture_.samples = 2;
+  picture_.samples = picture_samples;
   PinholeCamera camera = three_quarter_view(outer_.positions({}), mean_normal, picture_);
   // Room for the colour bar on the right and for colliders above.
   camera.K.topLeftCorner<2, 2>() *= 0.87;
@@ -118,7 +122,8 @@ void FrameWriter::draw(int frame, const State& state, const VectorXd& magnitude)
   const Scene& scene = scene_model_->scene();
   PictureOptions options = picture_;
   char title[160];
-  std::snprintf(title, sizeof title, "%.100s, frame %d, %.3f s", scene.name.c_str(), frame, state.time);
+  std::snprintf(title, sizeof title, "%.100s, frame %d, %.3f s", shown_name(scene).c_str(), frame,
+                state.time);
   options.title = title;
   const std::vector<PictureSolid> solids = collider_solids(scene, state.time);
   write_png(folder_ + numbered("/pictures/shaded_%04d.png", frame),
@@ -131,6 +136,17 @@ void FrameWriter::draw(int frame, const State& state, const VectorXd& magnitude)
   field.maximum = largest > 0 ? round_up(largest) : 1;
   write_png(folder_ + numbered("/pictures/displacement_%04d.png", frame),
             draw_surface(outer_, state.u, options, &field, solids));
+}
+
+double measure_pictures(const SceneModel& scene_model, const FrameOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  const SubdividedSurface outer(scene_model.model().mesh, SurfaceSide::outer, options.subdivision);
+  PictureOptions picture;
+  picture.width = std::max(64, options.picture_width / 2);
+  picture.height = std::max(64, options.picture_height / 2);
+  picture.samples = picture_samples;
+  (void)encode_png(draw_surface(outer, {}, picture, nullptr, collider_solids(scene_model.scene(), 0)));
+  return 2 * 4 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
 }  // namespace rhytid::tools

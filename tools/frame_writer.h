@@ -42,4 +42,8 @@ class FrameWriter {
 /// Colliders as glass bodies at time t (spheres; planes are not drawn).
 std::vector<PictureSolid> collider_solids(const Scene& scene, double t);
 
+/// Time that the two pictures of a frame take, s: measured at rest on a picture of half the width, since it
+/// goes with the number of pixels.
+double measure_pictures(const SceneModel& scene_model, const FrameOptions& options);
+
 }  // namespace rhytid::tools

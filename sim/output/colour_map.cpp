@@ -17,6 +17,22 @@ double to_srgb(double l) {
   return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055;
 }
 
+/// lround(255 · to_srgb(l)) for l in [0, 1], from a table: pictures ask for millions.
+std::uint8_t srgb_byte(double l) {
+  constexpr int cells = 8192;
+  static const auto first = [] {  // the byte at the beginning of each cell
+    std::array<std::uint8_t, cells + 1> bytes{};
+    for (std::size_t k = 0; k < bytes.size(); ++k)
+      bytes[k] = static_cast<std::uint8_t>(std::lround(255 * to_srgb(static_cast<double>(k) / cells)));
+    return bytes;
+  }();
+  if (!(l > 0)) return 0;
+  const auto cell = std::min(static_cast<std::size_t>(l * cells), static_cast<std::size_t>(cells - 1));
+  // Inside most cells nothing changes; where it does, the formula decides.
+  return first[cell] == first[cell + 1] ? first[cell]
+                                        : static_cast<std::uint8_t>(std::lround(255 * to_srgb(l)));
+}
+
 /// Linear sRGB → cone-like response and response^(1/3) → Lab, as published.
 Mat3 lms_from_rgb() {
   Mat3 m;
@@ -56,13 +72,18 @@ std::vector<Rgb> table(const std::vector<Rgb>& control) {
 }  // namespace
 
 Vec3 linear_from_srgb(Rgb c) {
-  return {to_linear(c.r / 255.0), to_linear(c.g / 255.0), to_linear(c.b / 255.0)};
+  static const std::array<double, 256> linear = [] {
+    std::array<double, 256> values{};
+    for (std::size_t k = 0; k < values.size(); ++k) values[k] = to_linear(static_cast<double>(k) / 255.0);
+    return values;
+  }();
+  return {linear[c.r], linear[c.g], linear[c.b]};
 }
 
 Rgb srgb_from_linear(const Vec3& linear) {
   std::array<std::uint8_t, 3> out;
   for (int k = 0; k < 3; ++k) {
-    out[k] = static_cast<std::uint8_t>(std::lround(255 * to_srgb(std::clamp(linear[k], 0.0, 1.0))));
+    out[k] = srgb_byte(std::clamp(linear[k], 0.0, 1.0));
   }
   return {out[0], out[1], out[2]};
 }

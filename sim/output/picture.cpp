@@ -1,6 +1,7 @@
 #include "sim/output/picture.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -39,14 +40,21 @@ Lighting raking_light(const PinholeCamera& camera, const Vec3& mean_normal, cons
           1 / std::max(0.2, std::sin(elevation))};
 }
 
+/// x^40 by squaring.
+double highlight(double x) {
+  const double x2 = x * x, x4 = x2 * x2, x8 = x4 * x4, x16 = x8 * x8;
+  return x16 * x16 * x8;
+}
+
 /// Linear-light colour of a matt, slightly oily surface. `normal` faces the eye.
 Vec3 shaded(const Vec3& albedo, const Vec3& normal, const Vec3& to_eye, const Lighting& light, double gloss) {
   const double key = std::max(0.0, normal.dot(light.key)) * light.key_gain;
   const double fill = std::max(0.0, normal.dot(light.fill));
   const double sky = 0.5 + 0.5 * normal.dot(light.up);
   const double diffuse = 0.60 * key + 0.12 * fill + 0.20 * sky;
-  const double half = std::max(0.0, normal.dot((light.key + to_eye).normalized()));
-  const Vec3 lit = albedo * diffuse + Vec3::Constant(gloss * std::pow(half, 40.0));
+  Vec3 lit = albedo * diffuse;
+  if (gloss > 0)
+    lit.array() += gloss * highlight(std::max(0.0, normal.dot((light.key + to_eye).normalized())));
   // Soft shoulder: bright slopes stay distinguishable instead of clipping.
   return lit.unaryExpr([](double c) { return c < 0.7 ? c : 0.7 + 0.3 * (1 - std::exp((0.7 - c) / 0.3)); });
 }
@@ -175,10 +183,19 @@ Image draw_surface(const SubdividedSurface& surface, const VectorXd& displacemen
   }
 
   const Vec3 background = linear_from_srgb(options.background);
+  const Mat3 pixel_to_ray = camera.R.transpose() * camera.K.inverse();
+  const auto is_empty = [&](size_t at) {
+    return seen.triangle[at] < 0 && std::all_of(glass.begin(), glass.end(), [at](const VisibilityBuffer& g) {
+             return g.triangle[at] < 0;
+           });
+  };
+  std::vector<Vec3> solid_colours;
+  for (const PictureSolid& solid : solids) solid_colours.push_back(linear_from_srgb(solid.colour));
   const auto sample_colour = [&](int sx, int sy) -> Vec3 {
     const size_t at = seen.index(sx, sy);
+    if (is_empty(at)) return background;
     const Vec2 pixel = seen.position(sx, sy);
-    const Vec3 to_eye = -camera.ray(pixel.x(), pixel.y());
+    const Vec3 to_eye = -(pixel_to_ray * Vec3(pixel.x(), pixel.y(), 1)).normalized();
     Vec3 colour = background;
     if (seen.triangle[at] >= 0) {
       const auto& triangle = surface.triangles()[seen.triangle[at]];
@@ -199,9 +216,9 @@ Image draw_surface(const SubdividedSurface& surface, const VectorXd& displacemen
       const auto& triangle = solids[g].triangles[glass[g].triangle[at]];
       const Vec3 normal =
           toward(interpolated(solids[g].normals, triangle, glass[g].weights(at)).normalized(), to_eye);
-      const double rim = std::pow(1 - std::clamp(normal.dot(to_eye), 0.0, 1.0), 3.0);
+      const double away = 1 - std::clamp(normal.dot(to_eye), 0.0, 1.0), rim = away * away * away;
       const double opacity = solids[g].opacity + (1 - solids[g].opacity) * 0.8 * rim;
-      const Vec3 lit = shaded(linear_from_srgb(solids[g].colour), normal, to_eye, light, 0.5);
+      const Vec3 lit = shaded(solid_colours[g], normal, to_eye, light, 0.5);
       colour = (1 - opacity) * colour + opacity * lit;
     }
     return colour;

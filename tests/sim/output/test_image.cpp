@@ -3,6 +3,7 @@
 #include <png.h>
 
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <random>
 
@@ -149,6 +150,13 @@ TEST(ColourMap, SequentialLightnessRisesAndDivergingPeaksInTheMiddle) {
   EXPECT_EQ(hex_colour({1, 171, 255}), "#01abff");
   for (const Rgb c : {Rgb{0, 0, 0}, Rgb{255, 255, 255}, Rgb{12, 200, 99}}) {
     EXPECT_EQ(srgb_from_linear(linear_from_srgb(c)), c);
+  }
+  // The transfer function of sRGB (IEC 61966-2-1), rounded; between the entries of any table too.
+  for (int i = 0; i <= 100000; ++i) {
+    const double l = i / 100000.;
+    const double s = l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055;
+    ASSERT_EQ(srgb_from_linear({l, 1, 0}), (Rgb{static_cast<std::uint8_t>(std::lround(255 * s)), 255, 0}))
+        << l;
   }
 }
 
