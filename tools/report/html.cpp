@@ -8,9 +8,9 @@ namespace rhytid::tools {
 namespace {
 
 constexpr const char* style = R"(
-:root{color-scheme:light dark;--page:#f6f6f4;--card:#fff;--ink:#1d1f23;--soft:#5c6068;--line:#dcdcd8;--accent:#0a5c99;
+:root{color-scheme:light dark;--page:#f6f6f4;--card:#fff;--ink:#1d1f23;--soft:#5c6068;--line:#dcdcd8;--edge:#0003;--accent:#0a5c99;
 --good:#0b6b4b;--doubtful:#8a5a00;--bad:#a4262c}
-@media(prefers-color-scheme:dark){:root{--page:#17191c;--card:#212429;--ink:#e9eaec;--soft:#a4a9b2;--line:#383c43;
+@media(prefers-color-scheme:dark){:root{--page:#17191c;--card:#212429;--ink:#e9eaec;--soft:#a4a9b2;--line:#383c43;--edge:#000a;
 --accent:#7cc0f2;--good:#5fd1a5;--doubtful:#e8b45a;--bad:#ff9a94}}
 *{box-sizing:border-box}
 html{-webkit-text-size-adjust:100%;text-size-adjust:100%}
@@ -32,7 +32,12 @@ section{background:var(--card);border:1px solid var(--line);border-radius:10px;p
 .badge{display:inline-block;border:1.5px solid;border-radius:999px;padding:2px 12px;font-size:.9rem;font-weight:600;
 margin:0 0 12px}
 .good{color:var(--good)}.doubtful{color:var(--doubtful)}.bad{color:var(--bad)}
-.scroll{overflow-x:auto;margin:0 0 14px}
+:focus-visible{outline:2px solid var(--accent);outline-offset:2px}
+.scroll{overflow-x:auto;margin:0 0 14px;background:linear-gradient(90deg,var(--card) 30%,transparent) 0 0/48px 100%,
+linear-gradient(270deg,var(--card) 30%,transparent) 100% 0/48px 100%,linear-gradient(90deg,var(--edge),transparent) 0 0/16px
+100%,linear-gradient(270deg,var(--edge),transparent) 100% 0/16px 100%;background-repeat:no-repeat;
+background-attachment:local,local,scroll,scroll}
+tbody th{position:sticky;left:0;background:var(--card)}
 table{border-collapse:collapse;font-size:.92rem;font-variant-numeric:tabular-nums;min-width:min(100%,420px)}
 .caption{color:var(--soft);margin:0 0 4px;font-size:.9rem}
 th,td{padding:6px 12px 6px 0;border-bottom:1px solid var(--line);text-align:right;vertical-align:top}
@@ -49,10 +54,11 @@ figure img,figure svg{display:block;width:100%;height:auto;border-radius:6px;bac
 figure svg{max-width:640px}
 .row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:6px 22px;align-items:start}
 @media(max-width:560px){main,header,nav{padding:0 12px}header{padding-top:20px}section{padding:16px 14px}
+.look{overflow-x:auto}.look svg,.look img{min-width:600px}figcaption::before{content:"Scroll sideways to see all. "}
 h1{font-size:1.4rem}dl{grid-template-columns:1fr;gap:0}dd{margin-bottom:8px}th,td{padding-right:9px}}
 @media print{:root{color-scheme:light;--page:#fff;--card:#fff;--ink:#000;--soft:#444;--line:#bbb}nav{display:none}
 body{font-size:10.5pt}section{border:0;padding:0}figure,tr,pre{break-inside:avoid}h2,h3{break-after:avoid}
-.scroll,pre{overflow:visible}pre{white-space:pre-wrap}td{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
+.scroll,.look,pre{overflow:visible;background:none}pre{white-space:pre-wrap}td{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 )";
 
 /// In HTML an inline <svg> needs no name space, and its own <title> would say the alt text a second time.
@@ -120,7 +126,8 @@ void HtmlPage::facts(const std::vector<std::pair<std::string, std::string>>& fac
 void HtmlPage::table(const HtmlTable& table) {
   const std::string id = "table-" + std::to_string(++num_tables_);
   body_ += "<div><p class=\"caption\" id=\"" + id + "\">" + xml_escaped(table.caption) + "</p>\n";
-  body_ += "<div class=\"scroll\"><table aria-labelledby=\"" + id + "\"";
+  body_ += "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-labelledby=\"" + id +
+           "\"><table aria-labelledby=\"" + id + "\"";
   if (table.wide) body_ += " class=\"wide\"";
   body_ += ">\n<thead><tr>";
   for (size_t i = 0; i < table.header.size(); ++i) {
@@ -157,15 +164,15 @@ void HtmlPage::code(const std::string& text) {
 }
 
 void HtmlPage::svg_figure(const std::string& svg, const std::string& alt, const std::string& caption) {
-  body_ += "<figure><div role=\"img\" aria-label=\"" + xml_escaped(alt) + "\">" + inline_svg(svg) +
-           "</div>\n<figcaption>" + xml_escaped(caption) + "</figcaption></figure>\n";
+  body_ += "<figure><div class=\"look\" role=\"img\" aria-label=\"" + xml_escaped(alt) + "\">" +
+           inline_svg(svg) + "</div>\n<figcaption>" + xml_escaped(caption) + "</figcaption></figure>\n";
 }
 
 void HtmlPage::image_figure(const std::string& data_uri, int width, int height, const std::string& alt,
                             const std::string& caption) {
-  body_ += "<figure><img src=\"" + xml_escaped(data_uri) + "\" width=\"" + std::to_string(width) +
-           "\" height=\"" + std::to_string(height) + "\" alt=\"" + xml_escaped(alt) + "\">\n<figcaption>" +
-           xml_escaped(caption) + "</figcaption></figure>\n";
+  body_ += "<figure><div class=\"look\"><img src=\"" + xml_escaped(data_uri) + "\" width=\"" +
+           std::to_string(width) + "\" height=\"" + std::to_string(height) + "\" alt=\"" + xml_escaped(alt) +
+           "\"></div>\n<figcaption>" + xml_escaped(caption) + "</figcaption></figure>\n";
 }
 
 void HtmlPage::begin_row() {

@@ -67,6 +67,17 @@ TEST(HtmlPage, TextOnColourCanBeRead) {
   EXPECT_THROW(page.table({{"a", "b"}, {{"only one"}}, ""}), ContractError);
 }
 
+TEST(HtmlPage, WhatIsWiderThanAPhoneScrollsByKeyboardTooAndSaysSo) {
+  HtmlPage page("t", "s");
+  page.table({{"a", "b"}, {{"x", "y"}}, "caption"});
+  page.image_figure(png_uri(std::string("\0\1\2", 3)), 900, 2, "alt", "caption");
+  const std::string html = page.finish();
+  EXPECT_EQ(test::html_complaint(html), "");
+  EXPECT_THAT(html, HasSubstr("class=\"scroll\" tabindex=\"0\" role=\"region\""));
+  EXPECT_THAT(html, HasSubstr("<div class=\"look\"><img"));
+  EXPECT_THAT(html, HasSubstr("Scroll sideways to see all."));
+}
+
 TEST(Wording, UnitsThatReadWell) {
   const ReadableUnit unit = readable_unit(0.0123, "MPa");
   EXPECT_EQ(unit.unit, "kPa");
