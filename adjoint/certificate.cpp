@@ -174,8 +174,8 @@ void Certification::taylor() {
   for (const auto& [key, points] : counts) report_.regimes.push_back({key.first, key.second, points});
 
   if (addresses_.empty())
-    add({"Taylor slope", 0, 2, Verdict::fail,
-         "no parameter has an effect on the functional: nothing to test"});
+    add({"Taylor slope", 0, 2, Verdict::fail, "no parameter has an effect on the functional: nothing to test",
+         LimitKind::near});
   std::vector<ParameterGroup> groups{{"joint", addresses_}};
   groups.insert(groups.end(), options_.groups.begin(), options_.groups.end());
   if (options_.each_parameter)
@@ -214,7 +214,7 @@ void Certification::taylor() {
       double slope = std::numeric_limits<double>::quiet_NaN();
       if (!series.slopes.empty()) slope = series.slopes.back();
       add({"Taylor slope, " + group.name + ", " + direction, slope, 2,
-           series.passed ? Verdict::pass : Verdict::fail, series.sentence});
+           series.passed ? Verdict::pass : Verdict::fail, series.sentence, LimitKind::near});
       report_.taylor.push_back(std::move(series));
     }
   }
@@ -299,7 +299,8 @@ void Certification::pivots() {
                 ? "the Hessian comes near to singular at step %zu (t = %.4g s): a bifurcation is near, "
                   "derivatives hold in a small neighbourhood only"
                 : "every Hessian is positive definite and none stands out (smallest at step %zu, t = %.4g s)",
-            step, run_.steps[step].step.t)});
+            step, run_.steps[step].step.t),
+       LimitKind::at_least});
 }
 
 void Certification::repeatability() {

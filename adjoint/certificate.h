@@ -52,11 +52,15 @@ enum class Verdict {
 };
 const char* name(Verdict verdict);
 
+/// How the figure of a check stands to its limit when the check passes.
+enum class LimitKind { at_most, at_least, near };
+
 struct CertificateCheck {
   std::string name;
   double figure = 0, threshold = 0;  ///< what was measured, and its limit
   Verdict verdict = Verdict::fail;
   std::string sentence;
+  LimitKind limit = LimitKind::at_most;
 };
 
 struct RegimeCount {

@@ -13,6 +13,10 @@ std::string line(const char* format, auto... values) {
   return std::string(buffer) + "\n";
 }
 
+const char* limit_sign(LimitKind kind) {
+  return kind == LimitKind::at_most ? "<=" : kind == LimitKind::at_least ? ">=" : "near";
+}
+
 const char* transform_name(ParameterTransform t) {
   return t == ParameterTransform::log ? "log" : t == ParameterTransform::logit ? "logit" : "none";
 }
@@ -26,7 +30,8 @@ std::string certificate_text(const CertificateReport& r) {
                        : "The gradient of this scene is NOT certified: a check failed.\n";
   out += "\nverdict  check                                                  figure      limit\n";
   for (const CertificateCheck& c : r.checks) {
-    out += line("%-8s %-52s %9.3g  %9.3g", name(c.verdict), c.name.c_str(), c.figure, c.threshold);
+    out += line("%-8s %-52s %9.4g  %s %.4g", name(c.verdict), c.name.c_str(), c.figure, limit_sign(c.limit),
+                c.threshold);
     out += "         " + c.sentence + "\n";
   }
   out +=
@@ -68,6 +73,7 @@ nlohmann::json certificate_json(const CertificateReport& r) {
     j["checks"].push_back({{"name", c.name},
                            {"figure", c.figure},
                            {"limit", c.threshold},
+                           {"passes_when", limit_sign(c.limit)},
                            {"verdict", c.verdict == Verdict::pass      ? "pass"
                                        : c.verdict == Verdict::warning ? "warning"
                                                                        : "fail"},

@@ -40,6 +40,9 @@ expect() {
 expect 0 "$folder/scene.json" -o "$folder/a" --parameters /skin/layers/soft/youngs_modulus,/base/stiffness --thorough
 cmp "$folder/out" "$folder/a/certificate.txt" || failures=$((failures + 1))
 grep -q '"passed": true' "$folder/a/certificate.json" || { echo "FAILED: certificate.json"; failures=$((failures + 1)); }
+# Figures with their digits, limits with their direction: 1.97 near 2, 0.4 >= 0.1.
+grep -qE '^pass +Taylor slope, joint, random +(1\.9[5-9][0-9]*|2|2\.0[0-9]*) +near 2$' "$folder/out" || { echo "FAILED: slope"; cat "$folder/out"; failures=$((failures + 1)); }
+grep -qE '^pass +pivots +[0-9.]+ +>= 0\.1$' "$folder/out" || { echo "FAILED: pivots"; failures=$((failures + 1)); }
 grep -q 'Taylor slope, soft youngs_modulus' "$folder/out" || { echo "FAILED: --thorough"; failures=$((failures + 1)); }
 # No viscosity: its time has no effect, so there is nothing to certify.
 expect 3 "$folder/scene.json" -o "$folder/b" --set /skin/layers/soft/relaxing_fraction=0 \
