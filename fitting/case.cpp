@@ -34,6 +34,7 @@ RenderCase read_render(const json& j) {
 TrackCase read_track(const json& j) {
   TrackCase c;
   c.max_tracks = j["max_tracks"], c.min_distance = j["min_distance"], c.mask_finger = j["mask_finger"];
+  c.model = j["model"];
   if (j.contains("roi")) c.roi = j["roi"].get<std::array<double, 4>>();
   return c;
 }
@@ -85,9 +86,8 @@ class ParameterReader {
     try {
       return describe_parameter(scene_, address);
     } catch (const InputError&) {
-      throw InputError(
-          where("address"), shown_json(address),
-          "a fit-able scalar of " + scene_.file + ", nearest is " + nearest_word(address, known));
+      throw InputError(where("address"), shown_json(address),
+                       "in " + scene_.file + " " + expected_parameter(scene_, address));
     }
   }
 
@@ -133,6 +133,12 @@ class ParameterReader {
   std::set<std::string> seen_;
 };
 
+/// "/settings/N" behind the settings that a case has.
+std::string setting_address(const LocatedJson& written) {
+  const json settings = written.json.value("settings", json::array());
+  return "/settings/" + std::to_string(settings.is_array() ? settings.size() : 0);
+}
+
 void check_gauge_layer(const LocatedJson& located, const Scene& scene, const std::string& layer) {
   if (layer.empty()) return;
   std::vector<std::string> names;
@@ -152,10 +158,41 @@ std::string find_or_in_folder(const std::string& given, const std::string& case_
   return (fs::path(folder) / path.filename()).string();
 }
 
+/// A scene where a case is wanted, and values of the scene addressed as if they were the case's: said here,
+/// since as unknown keys they would only be compared with the keys of cases.
+void refuse_scene(const LocatedJson& written, const std::string& path,
+                  const std::vector<std::string>& settings) {
+  if (written.json.contains("skin") && !written.json.contains("scene"))
+    throw InputError(path, "a scene",
+                     "a case, which names its scene (an example: data/scenes/demo/case.json)");
+  for (const std::string& setting : settings) {
+    const std::vector<std::string> keys =
+        split_pointer(std::string_view(setting).substr(0, setting.find('=')), "--set");
+    if (keys.empty() || case_rule_tree().child(keys[0]) || !scene_rule_tree().child(keys[0])) continue;
+    throw InputError("--set " + shown_json(setting), "a value of the scene",
+                     "one of the case; this changes its scene: --set " +
+                         shown_json(setting_address(written) + "=" + setting));
+  }
+}
+
+/// The scene of the fit. What its messages say to set is set through the case.
+Scene scene_of_fit(const Case& c, const LocatedJson& written) {
+  try {
+    return load_scene(c.scene, c.scene_settings);
+  } catch (const InputError& error) {
+    std::string text = error.what();
+    const std::string advice = "e.g. --set /";
+    if (const std::size_t at = text.find(advice); at != std::string::npos)
+      text.insert(at + advice.size() - 1, setting_address(written) + "=");
+    throw InputError(text);
+  }
+}
+
 }  // namespace
 
 Case load_case(const std::string& path, const std::vector<std::string>& settings) {
   LocatedJson written = read_with_extends(path, case_rule_tree());
+  refuse_scene(written, path, settings);
   for (const std::string& assignment : settings) apply_override(written, assignment, path, case_rule_tree());
   const LocatedJson located = resolve_against_rules(written, case_rule_tree());
   const json& root = located.json;
@@ -174,12 +211,15 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
   c.footage = root["footage"], c.tracks = root["tracks"];
   c.render = read_render(root["render"]);
   c.track = read_track(root["track"]);
+  if (c.track.roi && ((*c.track.roi)[2] < 1 || (*c.track.roi)[3] < 1))
+    throw InputError(located.where("/track/roi") + ": /track/roi", shown_json(root["track"]["roi"]),
+                     "x, y, width and height with a width and a height of at least 1 px");
   c.fit = read_fit(root["fit"]);
   if (c.fit.last_frame != 0 && c.fit.last_frame < c.fit.first_frame)
     throw InputError(located.where("/fit/last_frame") + ": /fit/last_frame", std::to_string(c.fit.last_frame),
                      "0 (all frames) or at least first_frame, " + std::to_string(c.fit.first_frame));
 
-  const Scene scene = load_scene(c.scene, c.scene_settings);
+  const Scene scene = scene_of_fit(c, written);
   if (c.name.empty()) c.name = scene.name.empty() ? fs::path(path).stem().string() : scene.name;
   ParameterReader reader(located, scene);
   for (std::size_t i = 0; i < root["fit"]["parameters"].size(); ++i)

@@ -47,6 +47,7 @@ struct TrackCase {
   double min_distance = 8;                   ///< px between tracks
   std::optional<std::array<double, 4>> roi;  ///< x, y, width, height, px
   bool mask_finger = true;                   ///< drop tracks that the projected colliders of the scene cover
+  std::string model = "affine";              ///< affine | translation: warp of the window about a point
 };
 
 struct FitCase {

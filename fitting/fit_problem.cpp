@@ -6,6 +6,7 @@
 
 #include "adjoint/sweeps.h"
 #include "sim/core/error.h"
+#include "sim/core/units.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -14,14 +15,18 @@ int last_used_frame(const Scene& scene, const FitCase& fit) {
   return fit.last_frame > 0 ? std::min(fit.last_frame, scene.time.frames) : scene.time.frames;
 }
 
-/// Footage and simulation must agree on when frame f is; half a frame at the end is too much.
+/// Footage and simulation must agree on when frame f is, to the rounding of time stamps: a wrong rate shows
+/// within a few frames, long before it amounts to a frame.
 void check_times(const Track& track, double frame_rate) {
   for (const Observation& o : track.observations)
-    if (std::fabs(o.time_s * frame_rate - o.frame) > 0.5)
+    if (std::fabs(o.time_s - o.frame / frame_rate) > std::max(0.02 / frame_rate, 0.6e-3))
       throw InputError("tracks: track " + std::to_string(track.id) + ", frame " + std::to_string(o.frame),
                        std::to_string(o.time_s) + " s",
-                       std::to_string(o.frame / frame_rate) + " s (the scene's frame rate is " +
-                           std::to_string(frame_rate) + " 1/s)");
+                       std::to_string(o.frame / frame_rate) + " s; the scene's /time/frame_rate is " +
+                           format_quantity(frame_rate, dimension::frequency, 6) +
+                           (o.time_s > 0 ? ", the footage's about " +
+                                               format_quantity(o.frame / o.time_s, dimension::frequency, 6)
+                                         : std::string()));
 }
 
 /// The surface that frame 0 shows: at rest, or settled under its pre-stretch (initial parameters).

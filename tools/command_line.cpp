@@ -34,13 +34,18 @@ void add_verb(CLI::App& app, Verb& verb, CommonOptions& options) {
   CLI::App* sub = app.add_subcommand(help.name, help.summary);
   sub->footer(footer(help));
   if (verb.takes_file()) {
-    sub->add_option("file", options.file, "scene.json or case.json")
+    sub->add_option("file", options.file,
+                    verb.takes_case() ? "a case, as data/scenes/demo/case.json"
+                                      : "a scene, or a case for the scene that it fits")
         ->required(!verb.file_is_optional())
         ->option_text("FILE");
     sub->add_option("-o,--output", options.output, "folder for results (default run/<name of the scene>)")
         ->option_text("DIR");
     sub->add_option("--set", options.settings,
-                    "change one value of the file, as --set /time/frames=12; repeatable")
+                    verb.takes_case()
+                        ? "change one value of the case, as --set /fit/max_evaluations=20, or of its "
+                          "scene, as --set /settings/0=/time/frames=12; repeatable"
+                        : "change one value of the scene, as --set /time/frames=12; repeatable")
         ->option_text("/POINTER=VALUE")
         ->allow_extra_args(false);
   }
@@ -67,6 +72,16 @@ void require_known_verb(const Program& program, int argc, const char* const* arg
     if (verb->help().name == first) return;
   }
   throw InputError("verb", "'" + first + "'", expected);
+}
+
+/// The folder and those around it that do not exist, innermost first.
+std::vector<std::filesystem::path> missing_folders(const std::string& folder) {
+  std::vector<std::filesystem::path> missing;
+  std::error_code ignored;
+  std::filesystem::path path = std::filesystem::absolute(folder, ignored).lexically_normal();
+  for (; path.has_relative_path() && !std::filesystem::exists(path, ignored); path = path.parent_path())
+    missing.push_back(path);
+  return missing;
 }
 
 ExitCode parse_and_run(const Program& program, int argc, const char* const* argv, std::ostream& out,
@@ -109,7 +124,14 @@ ExitCode parse_and_run(const Program& program, int argc, const char* const* argv
     InterruptGuard guard;
     Progress progress(progress_style_for_stderr(options.log_json), err);
     VerbContext context{options, program, progress, out};
-    return verb->run(context);
+    const auto missing = missing_folders(options.output);
+    try {
+      return verb->run(context);
+    } catch (const InputError&) {
+      std::error_code ignored;  // a refused command leaves no empty folders; others are not removed
+      for (const std::filesystem::path& folder : missing) std::filesystem::remove(folder, ignored);
+      throw;
+    }
   }
   throw ContractError("a parsed verb is not in the program");
 }
@@ -122,14 +144,18 @@ void check_setting(const std::string& text) {
   }
 }
 
-std::string default_output(const std::string& file) {
+std::string name_of_file(const std::string& file) {
   const std::filesystem::path path(file);
   std::filesystem::path name = path.stem();
   if (name == "scene" || name == "case") {
     const auto parent = std::filesystem::absolute(path).lexically_normal().parent_path().filename();
     if (!parent.empty()) name = parent;
   }
-  return (std::filesystem::path("run") / name).lexically_normal().string();
+  return name.string();
+}
+
+std::string default_output(const std::string& file) {
+  return (std::filesystem::path("run") / name_of_file(file)).lexically_normal().string();
 }
 
 std::string VerbContext::output_folder() const {

@@ -13,6 +13,7 @@
 #include "tools/earlier_run.h"
 #include "tools/run_checkpoint.h"
 #include "tools/run_record.h"
+#include "tools/scene_argument.h"
 #include "tools/step_table.h"
 
 namespace rhytid::tools {
@@ -34,7 +35,7 @@ class ForwardRun {
       : started_(now()),
         context_(context),
         listener_(listener),
-        scene_model_(load_scene(context.options.file, context.options.settings)),
+        scene_model_(load_scene_argument(context.options.file, context.options.settings, context.progress)),
         folder_(context.output_folder()),
         frames_(scene_model_, folder_, options),
         table_(scene_model_.model()),
@@ -47,6 +48,7 @@ class ForwardRun {
     RunOptions options = scene_model_.run_options();
     options.keep_states = false;
     State start = scene_model_.model().rest_state();
+    if (resume && !listener_ && is_complete()) return ExitCode::ok;
     if (listener_) listener_->begin(scene_model_, folder_);
     record_.setup_seconds = now() - started_;
     if (!resume || !restore(options, start)) begin(start);
@@ -93,11 +95,27 @@ class ForwardRun {
     record_.write("running");
   }
 
+  /// Whether the folder holds this run with all its frames; nothing of it is touched then.
+  bool is_complete() const {
+    const auto checkpoint = read_checkpoint(folder_ + "/state.bin", identity_);
+    const int frames = scene_model_.scene().time.frames;
+    if (!checkpoint || checkpoint->frame < frames || recorded_status(folder_ + "/run.json") != "complete")
+      return false;
+    context_.out << shown_name(scene_model_.scene()) << ": complete already, " << checkpoint->frame
+                 << " frames in " << folder_ << "; nothing was changed\n";
+    return true;
+  }
+
   /// False when there is nothing to resume from.
   bool restore(RunOptions& options, State& start) {
     auto checkpoint = read_checkpoint(folder_ + "/state.bin", identity_);
     if (!checkpoint) {
-      context_.progress.note("nothing to resume in " + folder_ + ": the run starts at rest");
+      const std::string text = "nothing to resume in " + folder_ + ": the run starts from the beginning";
+      if (listener_) {  // a study resumes whatever is there
+        context_.progress.note(text);
+      } else {
+        context_.progress.warning(text);
+      }
       return false;
     }
     const TimeScene& time = scene_model_.scene().time;
@@ -169,7 +187,7 @@ class ForwardRun {
                   "%d frames, %ld steps, %ld iterations; solving %.1f s, files %.1f s, setting up %.1f s\n",
                   record_.frames_done, record_.steps(), record_.iterations(), record_.solve_seconds,
                   record_.output_seconds, record_.setup_seconds);
-    context_.out << scene.name << ": " << text << "written to " << folder_ << ": run.json";
+    context_.out << shown_name(scene) << ": " << text << "written to " << folder_ << ": run.json";
     if (output().csv) context_.out << ", steps.csv";
     if (output().vtu) context_.out << ", frames.pvd, surface.pvd";
     if (output().pictures) context_.out << ", pictures/";

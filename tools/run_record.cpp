@@ -1,5 +1,7 @@
 #include "tools/run_record.h"
 
+#include <filesystem>
+
 #include "sim/core/build_info.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
@@ -93,6 +95,15 @@ void RunRecord::write(const std::string& status, const std::string& reason) cons
   j["resident_MB"] = std::round(resident_memory_mb());
   j.update(fixed_);
   write_file(path_, j.dump(2) + "\n");
+}
+
+std::string recorded_status(const std::string& path) {
+  if (!std::filesystem::is_regular_file(path)) return "";
+  const auto record = nlohmann::json::parse(read_file(path), nullptr, false);
+  const nlohmann::json::json_pointer status("/exit/status");
+  return record.is_object() && record.contains(status) && record[status].is_string()
+             ? record[status].get<std::string>()
+             : "";
 }
 
 }  // namespace rhytid::tools

@@ -33,4 +33,7 @@ class RunRecord {
   long steps_ = 0, iterations_ = 0, evaluations_ = 0, factorisations_ = 0, bisected_ = 0, softened_ = 0;
 };
 
+/// The status that a run.json records, "" when there is no readable one.
+std::string recorded_status(const std::string& path);
+
 }  // namespace rhytid::tools

@@ -108,33 +108,6 @@ void review_collider(const SceneModel& scene_model, const ColliderScene& collide
                        "): the boundary condition there will shape the result");
 }
 
-void review_ligaments(const SceneModel& scene_model, std::vector<std::string>& warnings) {
-  const Scene& scene = scene_model.scene();
-  if (!scene.ligaments || scene.ligaments->sources.empty()) return;
-  const SkinMesh& mesh = scene_model.model().mesh;
-  MatrixX3 inner(mesh.num_columns, 3);
-  for (int c = 0; c < mesh.num_columns; ++c) inner.row(c) = mesh.rest.row(mesh.node(c, 0));
-  const auto& listed = scene.ligaments->sources;
-  std::vector<HeatSource> sources;
-  for (std::size_t s = 0; s < listed.size(); ++s) {
-    sources.push_back({scene_model.source_positions()[s], listed[s].radius});
-    if (listed[s].vertex) continue;
-    const double moved = (scene_model.source_positions()[s] - listed[s].position).norm();
-    if (moved > std::max(2 * skin_thickness(scene.skin), mean_edge(mesh)))
-      warnings.push_back("ligament source " + listed[s].name + " was moved by " + length_text(moved) +
-                         " to reach the inner surface");
-  }
-  const HeatMapWeights heat =
-      diffuse_sources(inner, scene_model.column_triangles(), sources, scene.ligaments->diffusion_time);
-  if (heat.num_unreached > 0)
-    warnings.push_back(std::to_string(heat.num_unreached) + " of " + std::to_string(mesh.num_columns) +
-                       " inner nodes are reached by no ligament source and take the nearest one's strength; "
-                       "raise /ligaments/diffusion_time");
-  for (int s : heat.unresolved_sources)
-    warnings.push_back("ligament source " + listed[s].name + ": its radius " + length_text(listed[s].radius) +
-                       " contains no node, so that it acts on the nearest one alone");
-}
-
 }  // namespace
 
 SurfaceEdgeLengths surface_edge_lengths(const TriangleSurface& surface) {
@@ -165,12 +138,42 @@ std::optional<WrinkleScale> wrinkle_scale(const SceneModel& scene_model) {
   return scale;
 }
 
+std::vector<std::string> review_ligaments(const SceneModel& scene_model) {
+  std::vector<std::string> warnings;
+  const Scene& scene = scene_model.scene();
+  if (!scene.ligaments || scene.ligaments->sources.empty()) return warnings;
+  const SkinMesh& mesh = scene_model.model().mesh;
+  MatrixX3 inner(mesh.num_columns, 3);
+  for (int c = 0; c < mesh.num_columns; ++c) inner.row(c) = mesh.rest.row(mesh.node(c, 0));
+  const auto& listed = scene.ligaments->sources;
+  std::vector<HeatSource> sources;
+  for (std::size_t s = 0; s < listed.size(); ++s) {
+    sources.push_back({scene_model.source_positions()[s], listed[s].radius});
+    if (listed[s].vertex) continue;
+    const double moved = (scene_model.source_positions()[s] - listed[s].position).norm();
+    if (moved > std::max(2 * skin_thickness(scene.skin), mean_edge(mesh)))
+      warnings.push_back("ligament source " + listed[s].name + " was moved by " + length_text(moved) +
+                         " to reach the inner surface");
+  }
+  const HeatMapWeights heat =
+      diffuse_sources(inner, scene_model.column_triangles(), sources, scene.ligaments->diffusion_time);
+  if (heat.num_unreached > 0)
+    warnings.push_back(std::to_string(heat.num_unreached) + " of " + std::to_string(mesh.num_columns) +
+                       " inner nodes are reached by no ligament source and take the nearest one's strength; "
+                       "raise /ligaments/diffusion_time");
+  for (int s : heat.unresolved_sources)
+    warnings.push_back("ligament source " + listed[s].name + ": its radius " + length_text(listed[s].radius) +
+                       " contains no node, so that it acts on the nearest one alone");
+  return warnings;
+}
+
 std::vector<std::string> review_scene(const SceneModel& scene_model, const StepCost& cost) {
   std::vector<std::string> warnings;
   review_support(scene_model, cost, warnings);
   review_wrinkles(scene_model, warnings);
   for (const ColliderScene& c : scene_model.scene().colliders) review_collider(scene_model, c, warnings);
-  review_ligaments(scene_model, warnings);
+  const std::vector<std::string> of_ligaments = review_ligaments(scene_model);
+  warnings.insert(warnings.end(), of_ligaments.begin(), of_ligaments.end());
   return warnings;
 }
 

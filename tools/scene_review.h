@@ -40,4 +40,8 @@ SurfaceEdgeLengths surface_edge_lengths(const TriangleSurface& surface);
 /// One sentence per doubt that only the built model can raise; scene_warnings covers the file itself.
 std::vector<std::string> review_scene(const SceneModel& scene_model, const StepCost& cost);
 
+/// Those of them about the ligament sources: moved far to the surface, reaching no node, nodes that none
+/// reaches.
+std::vector<std::string> review_ligaments(const SceneModel& scene_model);
+
 }  // namespace rhytid::tools

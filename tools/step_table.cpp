@@ -126,4 +126,42 @@ void StepTable::restore(const std::string& csv, int last_frame, const std::vecto
   sums_ = carried;
 }
 
+std::string step_table_documentation() {
+  return R"(# The columns of steps.csv
+
+One row per converged step; the header carries the units. NAME stands for an energy term of the scene (`skin_elastic`,
+`ligaments`, `base_contact`, `contact_finger`, `friction_finger`, ...) or for a body (`base`, or a collider's name).
+
+| column | unit | meaning |
+| --- | --- | --- |
+| `step` | | number of the row, from 1 |
+| `frame` | | frame that the step leads to or lies before; 0: the skin settles under its pre-stretch |
+| `time` | s | end of the step |
+| `dt` | s | its length; shorter than usual after a bisection |
+| `NAME_energy` | mJ | energy of a term that is a function of the shape alone, now |
+| `NAME_incremental` | mJ | the same of a term whose energy in a step includes what the step dissipates: viscous skin, friction |
+| `stored_NAME` | mJ | what a term has stored now; `stored_NAME_PART` when it stores in several parts |
+| `stored_energy` | mJ | sum of what is stored |
+| `dissipated_NAME` | mJ | dissipated by a term since the start |
+| `work_NAME` | mJ | done by a moving body on the skin through a term since the start |
+| `collider_work` | mJ | done by all moving bodies since the start |
+| `rim_work` | mJ | done by a moving rim since the start |
+| `dissipated_energy` | mJ | dissipated by all terms since the start |
+| `numerical_dissipation` | mJ | lost to the time discretisation since the start |
+| `energy_imbalance` | mJ | what the account leaves over: work - stored - dissipated - numerical, by rounding and tolerance |
+| `iterations` | | Newton iterations of the step |
+| `evaluations` | | evaluations of the energy |
+| `factorisations` | | factorisations of the Hessian |
+| `bisections` | | how often the step was halved |
+| `softened` | | 1 when the step started from softened contacts |
+| `residual` | N | norm of the gradient at the end |
+| `tolerance` | N | below which the step counts as converged |
+| `smallest_pivot` | N/mm | of the Hessian's factor; near 0: near to losing stability |
+| `min_J` | | smallest ratio of volumes det F in the skin; below 0 an element would be inside out |
+| `max_displacement` | mm | largest displacement of a node |
+| `force_NAME_x`, `_y`, `_z` | N | force of the skin on a body, friction included |
+| `penetration_NAME` | mm | how deep the skin is in a body at most; 0 when they do not touch |
+)";
+}
+
 }  // namespace rhytid::tools

@@ -32,4 +32,7 @@ class StepTable {
   std::vector<double> sums_;  ///< mJ, of the columns that sum over the run
 };
 
+/// The columns as Markdown; NAME stands for a term, layer or body of the scene.
+std::string step_table_documentation();
+
 }  // namespace rhytid::tools

@@ -71,6 +71,8 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
   job.noise = c.fit;
   job.options.seeds.max_tracks = c.track.max_tracks;
   job.options.seeds.min_distance_px = c.track.min_distance;
+  job.options.model =
+      c.track.model == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
   if (c.track.roi) {
     const auto& r = *c.track.roi;
     job.options.seeds.region = cv::Rect(static_cast<int>(r[0]), static_cast<int>(r[1]),
@@ -117,7 +119,7 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
                      " of " + std::to_string(result.report.frames_asked) + " frames");
   fitting::write_tracks(result.tracks, in(folder, "tracks.csv"));
 
-  progress.stage("overlay", 0);
+  progress.stage("drawing the tracks over the footage", 0);
   fitting::FrameSource again(job.footage);
   const fitting::OverlayReport overlay =
       fitting::write_overlay(again, result.tracks, options.camera, in(folder, "overlay.mp4"));

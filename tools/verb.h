@@ -23,14 +23,17 @@ void check_setting(const std::string& text);
 
 /// The options that all verbs share.
 struct CommonOptions {
-  std::string file;                   ///< scene.json or case.json as typed; empty when the verb takes none
+  std::string file;                   ///< scene or case as typed; empty when the verb takes none
   std::string output;                 ///< folder for results; given by -o, else run/<name of the scene>
   std::vector<std::string> settings;  ///< "/json/pointer=value" in the order given, as load_scene takes them
   int threads = 1;                    ///< already applied to OpenMP and BLAS
   bool log_json = false;
 };
 
-/// The default output folder: run/<stem of the file>, or of its folder for scene.json and case.json.
+/// The stem of the file, or the name of its folder for scene.json and case.json.
+std::string name_of_file(const std::string& file);
+
+/// The default output folder: run/<name_of_file>.
 std::string default_output(const std::string& file);
 
 /// One line of doctor.
@@ -76,6 +79,8 @@ class Verb {
   virtual bool takes_file() const { return true; }
   /// Whether the file may be left out all the same (options.file is then empty).
   virtual bool file_is_optional() const { return false; }
+  /// Whether that file is a case; else it is a scene, or a case for its scene.
+  virtual bool takes_case() const { return false; }
   /// Options of its own, bound to members.
   virtual void add_options(CLI::App&) {}
   /// Does the work. Throws InputError for bad input (exit 2); numerical outcomes are exit codes.

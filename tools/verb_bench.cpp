@@ -22,7 +22,8 @@ class Bench : public Verb {
   bool takes_file() const override { return false; }
 
   void add_options(CLI::App& app) override {
-    app.require_subcommand(1);
+    app.require_subcommand(0, 1);
+    app.add_option("name", unknown_, "which one, as listed below")->option_text("NAME");
     app.fallthrough();
     app.add_option("-o,--output", output_, "folder for results (default run/bench_<name>)")
         ->option_text("DIR");
@@ -37,6 +38,11 @@ class Bench : public Verb {
   }
 
   ExitCode run(VerbContext& context) override {
+    if (chosen_ == nullptr) {
+      std::string names;
+      for (const auto& benchmark : benchmarks_) names += (names.empty() ? "" : ", ") + benchmark->help().name;
+      throw InputError("bench", unknown_.empty() ? "nothing" : "'" + unknown_ + "'", "one of " + names);
+    }
     CommonOptions options = context.options;
     options.output = output_.empty() ? "run/bench_" + chosen_->help().name : output_;
     VerbContext own{options, context.program, context.progress, context.out};
@@ -46,7 +52,7 @@ class Bench : public Verb {
  private:
   std::vector<std::unique_ptr<Benchmark>> benchmarks_ = make_benchmarks();
   Benchmark* chosen_ = nullptr;
-  std::string output_;
+  std::string output_, unknown_;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "adjoint/certificate_report.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "tools/scene_argument.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -42,7 +43,8 @@ class Certify : public Verb {
 
   ExitCode run(VerbContext& context) override {
     Progress& progress = context.progress;
-    const SceneModel scene_model(load_scene(context.options.file, context.options.settings));
+    const SceneModel scene_model(
+        load_scene_argument(context.options.file, context.options.settings, context.progress));
     for (const std::string& address : addresses_) (void)describe_parameter(scene_model.scene(), address);
     const std::string folder = context.output_folder();
     RunOptions options = scene_model.run_options();

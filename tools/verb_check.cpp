@@ -1,5 +1,6 @@
 // rhytid check: everything that can be said about a scene before it runs.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <nlohmann/json.hpp>
@@ -7,7 +8,10 @@
 
 #include "sim/core/units.h"
 #include "sim/scene/load.h"
+#include "sim/scene/parameter.h"
+#include "tools/frame_writer.h"
 #include "tools/model_size.h"
+#include "tools/scene_argument.h"
 #include "tools/scene_review.h"
 #include "tools/verb.h"
 
@@ -47,6 +51,7 @@ struct Findings {
   MemoryEstimate memory;
   std::optional<WrinkleScale> wrinkles;
   SurfaceEdgeLengths edges;
+  double picture_seconds = 0;  ///< per frame that is written
   std::vector<std::string> warnings;
 
   explicit Findings(const SceneModel& built)
@@ -56,9 +61,14 @@ struct Findings {
         memory(memory_estimate(built, size, cost.factor_entries)),
         wrinkles(wrinkle_scale(built)),
         edges(surface_edge_lengths(built.model().mesh.surface)),
+        picture_seconds(built.scene().output.pictures ? measure_pictures(built, {}) : 0),
         warnings(scene_warnings(built.scene())) {
     const std::vector<std::string> more = review_scene(built, cost);
     warnings.insert(warnings.end(), more.begin(), more.end());
+  }
+  int pictured_frames() const {
+    const Scene& scene = scene_model.scene();
+    return scene.output.pictures ? 1 + (scene.time.frames + scene.output.every - 1) / scene.output.every : 0;
   }
   int steps() const { return scene_model.scene().time.frames * scene_model.scene().time.substeps; }
   double run_seconds() const {
@@ -119,6 +129,7 @@ ordered_json to_json(const Findings& f) {
                    {"factorisation_s", f.cost.factor_seconds},
                    {"analysis_s", f.cost.analysis_seconds},
                    {"run_s", f.run_seconds()},
+                   {"pictures_s", f.pictured_frames() * f.picture_seconds},
                    {"memory_MB",
                     {{"model", f.memory.model},
                      {"matrix", f.memory.matrix},
@@ -128,6 +139,12 @@ ordered_json to_json(const Findings& f) {
                    {"resident_MB", resident_memory_mb()}};
   j["warnings"] = f.warnings;
   return j;
+}
+
+const char* transform_text(ParameterTransform transform) {
+  return transform == ParameterTransform::log     ? "log"
+         : transform == ParameterTransform::logit ? "logit"
+                                                  : "none";
 }
 
 class Lines {
@@ -153,7 +170,7 @@ std::string term_text(const TermSize& t) {
 void print(const Findings& f, std::ostream& out) {
   const Scene& scene = f.scene_model.scene();
   Lines lines(out);
-  out << scene.name << " (" << scene.file << ") is valid\n";
+  out << shown_name(scene) << " (" << scene.file << ") is valid\n";
   if (!scene.description.empty()) out << scene.description << '\n';
 
   lines.heading("Surface");
@@ -201,10 +218,43 @@ void print(const Findings& f, std::ostream& out) {
                                  seconds_text(f.cost.hessian_seconds) + ", factorisation " +
                                  seconds_text(f.cost.factor_seconds));
   lines.row("run", "about " + seconds_text(f.run_seconds()) + ": " + std::to_string(f.steps()) + " steps x " +
-                       std::to_string(expected_iterations) + " iterations, without files and pictures");
+                       std::to_string(expected_iterations) + " iterations");
+  if (f.pictured_frames() > 0)
+    lines.row("pictures", "about " + seconds_text(f.pictured_frames() * f.picture_seconds) +
+                              " more: 2 of each of " + std::to_string(f.pictured_frames()) +
+                              " frames; none with --set /output/pictures=false");
 
   lines.heading(f.warnings.empty() ? "No warnings" : "Warnings");
   for (const std::string& w : f.warnings) out << "  - " << w << '\n';
+}
+
+ordered_json parameters_json(const Scene& scene) {
+  ordered_json list = ordered_json::array();
+  for (const ParameterSpec& p : all_parameters(scene))
+    list.push_back({{"address", p.address},
+                    {"value", p.value},
+                    {"unit", p.unit},
+                    {"lower", p.lower},
+                    {"upper", p.upper},
+                    {"transform", transform_text(p.transform)}});
+  return list;
+}
+
+void print_parameters(const Scene& scene, std::ostream& out) {
+  const std::vector<ParameterSpec> all = all_parameters(scene);
+  std::size_t width = 10;
+  for (const ParameterSpec& p : all) width = std::max(width, p.address.size());
+  const auto row = [&](const std::string& address, const auto&... cells) {
+    out << std::left << std::setw(static_cast<int>(width)) << address;
+    ((out << "  " << std::setw(10) << cells), ...);
+  };
+  row("address", "value", "unit", "lower", "upper");
+  out << "  transform\n";
+  for (const ParameterSpec& p : all) {
+    row(p.address, number_text(p.value, "%.6g"), p.unit.empty() ? "-" : p.unit, number_text(p.lower, "%.6g"),
+        number_text(p.upper, "%.6g"));
+    out << "  " << transform_text(p.transform) << '\n';
+  }
 }
 
 class Check : public Verb {
@@ -218,15 +268,28 @@ class Check : public Verb {
         "wavelength against the mesh, estimates of memory and time, and warnings about settings that are "
         "allowed but doubtful. Nothing is simulated and nothing is written.",
         "scene.json, and the mesh it names",
-        "a report on stdout; one JSON object with --json",
+        "a report on stdout; one JSON object with --json; with --parameters a table of the addresses that a "
+        "fit "
+        "may use",
         "rhytid check data/scenes/sheet_drag/scene.json"};
   }
   void add_options(CLI::App& app) override {
     app.add_flag("--json", as_json_, "the findings as one JSON object");
+    app.add_flag("--parameters", parameters_,
+                 "only list what a fit may use: addresses with value, unit, default bounds and transform");
   }
 
   ExitCode run(VerbContext& context) override {
-    const SceneModel scene_model(load_scene(context.options.file, context.options.settings));
+    Scene scene = load_scene_argument(context.options.file, context.options.settings, context.progress);
+    if (parameters_) {
+      if (as_json_) {
+        context.out << parameters_json(scene).dump(2) << '\n';
+      } else {
+        print_parameters(scene, context.out);
+      }
+      return ExitCode::ok;
+    }
+    const SceneModel scene_model(std::move(scene));
     const Findings findings(scene_model);
     if (as_json_) {
       context.out << to_json(findings).dump(2) << '\n';
@@ -237,7 +300,7 @@ class Check : public Verb {
   }
 
  private:
-  bool as_json_ = false;
+  bool as_json_ = false, parameters_ = false;
 };
 
 }  // namespace

@@ -63,6 +63,7 @@ class Fit : public Verb {
         "evaluations/ (what a rerun need not compute again), and the table of answer.txt on stdout",
         "rhytid fit data/scenes/demo/case.json -o run/demo"};
   }
+  bool takes_case() const override { return true; }
   void add_options(CLI::App& app) override {
     app.add_option("--optimiser", optimiser_, "ceres or nlopt instead of what the case says")
         ->check(CLI::IsMember({"ceres", "nlopt"}));
@@ -115,7 +116,7 @@ class Fit : public Verb {
     const std::string answer = fitting::answer_text(result);
     write_file((fs::path(folder) / "answer.txt").string(), answer);
     progress.finish();
-    context.out << answer << (fs::path(folder) / "fit.json").string() << std::endl;
+    context.out << answer << "written: " << (fs::path(folder) / "fit.json").string() << std::endl;
     if (progress.interrupted()) return ExitCode::interrupted;
     const ExitCode code = result.converged ? ExitCode::ok : ExitCode::not_converged;
     const ExitCode reported = report(folder, context);
@@ -149,7 +150,7 @@ class Fit : public Verb {
       const ReportOutcome report = write_report(folder, context.progress);
       for (const std::string& sentence : report.left_out) context.progress.warning(sentence);
       context.progress.finish();
-      context.out << report.path << '\n';
+      context.out << "report: " << report.path << '\n';
       return report.interrupted ? ExitCode::interrupted : ExitCode::ok;
     } catch (const std::exception& error) {
       context.progress.error(std::string("the fit is complete, but its report could not be written: ") +

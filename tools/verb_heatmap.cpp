@@ -1,7 +1,10 @@
 // rhytid heatmap: ligament sources to the map of b over the inner surface.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <ostream>
+#include <sstream>
 
 #include "sim/core/error.h"
 #include "sim/output/csv.h"
@@ -12,6 +15,8 @@
 #include "sim/scene/scene_model.h"
 #include "sim/surface/heat_map.h"
 #include "tools/ply_file.h"
+#include "tools/scene_argument.h"
+#include "tools/scene_review.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -103,6 +108,17 @@ void draw(const LigamentMap& map, const VectorXd& values, const std::string& lab
   write_png(path, draw_surface(surface, {}, options, &field, balls));
 }
 
+/// An earlier map may have had other sources; its table names the pictures that it wrote.
+void remove_earlier_shares(const std::string& folder) {
+  std::ifstream table(folder + "/heatmap.csv");
+  std::string header, column;
+  std::getline(table, header);
+  for (std::istringstream names(header); std::getline(names, column, ',');) {
+    std::error_code ignored;
+    if (column.starts_with("weight_")) std::filesystem::remove(folder + "/" + column + ".png", ignored);
+  }
+}
+
 class Heatmap : public Verb {
  public:
   VerbHelp help() const override {
@@ -124,13 +140,15 @@ class Heatmap : public Verb {
   }
 
   ExitCode run(VerbContext& context) override {
-    Scene scene = load_scene(context.options.file, context.options.settings);
+    Scene scene = load_scene_argument(context.options.file, context.options.settings, context.progress);
     if (!scene.ligaments)
       throw InputError(context.options.file + ": /ligaments", "nothing",
                        "ligaments with at least one source");
     const SceneModel scene_model(std::move(scene));
     const LigamentMap map(scene_model);
+    for (const std::string& warning : review_ligaments(scene_model)) context.progress.warning(warning);
     const std::string folder = context.output_folder();
+    remove_earlier_shares(folder);
     context.progress.stage("heat map", with_weights_ ? 1 + static_cast<int>(map.sources().size()) : 1);
     write_surface(map, with_weights_, folder);
     write_table(map, with_weights_, folder);
@@ -143,12 +161,6 @@ class Heatmap : public Verb {
       draw(map, map.heat.weights.col(s), "share of " + source, name, folder + "/weight_" + source + ".png");
       context.progress.step_done(static_cast<int>(s) + 2);
     }
-    if (map.heat.num_unreached > 0)
-      context.progress.warning(std::to_string(map.heat.num_unreached) +
-                               " nodes are reached by no source and take the nearest one's strength");
-    for (const int s : map.heat.unresolved_sources)
-      context.progress.warning("source " + map.sources()[s].name +
-                               " contains no node within its radius and acts on the nearest one alone");
     context.out << "b from " << short_text(map.b.minCoeff()) << " to " << short_text(map.b.maxCoeff())
                 << " 1/mm over " << map.b.size() << " nodes; written to " << folder << '\n';
     return ExitCode::ok;

@@ -2,6 +2,8 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/LU>
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -15,16 +17,31 @@
 #include "sim/output/atomic_file.h"
 #include "sim/output/csv.h"
 #include "sim/output/plot.h"
+#include "sim/output/text.h"
 #include "sim/scene/load.h"
 #include "sim/scene/names.h"
 #include "sim/terms/material_point.h"
 #include "tools/material/history.h"
+#include "tools/scene_argument.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
 namespace {
 
 constexpr const char* kParameterUnits[SkinParameters::count] = {"", "MPa", "MPa", "MPa", "MPa/s"};
+
+/// A plain number is in internal units, as in scene files.
+double given_quantity(const std::string& text, Dimension dimension, const std::string& flag) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [after, status] = std::from_chars(text.data(), end, value);
+  const bool is_plain = status == std::errc() && after == end && std::isfinite(value);
+  return is_plain ? value : parse_quantity(text, dimension, flag);
+}
+
+std::string by_default(double value, Dimension dimension) {
+  return " (default " + format_quantity(value, dimension) + ")";
+}
 
 class Material : public Verb {
  public:
@@ -50,17 +67,19 @@ class Material : public Verb {
   bool takes_file() const override { return false; }
 
   void add_options(CLI::App& app) override {
+    const SkinParameters p;
     app.add_option("--scene", scene_, "take the layer and the damper from this scene")->option_text("FILE");
     app.add_option("--layer", layer_, "name of the layer in the scene (default: the first)")
         ->option_text("NAME");
     app.add_option("--set", settings_, "change one value of the scene; repeatable")
         ->option_text("/POINTER=VALUE")
         ->allow_extra_args(false);
-    for (const auto& [flag, help_text] : {std::pair{"youngs-modulus", "instantaneous E, e.g. '20 kPa'"},
-                                          {"poissons-ratio", "ν"},
-                                          {"stiffening", "C of the exponential"},
-                                          {"relaxing-fraction", "share of μ that relaxes"},
-                                          {"relaxation-time", "τ, e.g. '80 ms'"}})
+    for (const auto& [flag, help_text] :
+         {std::pair{"youngs-modulus", "instantaneous E" + by_default(p.youngs_modulus, dimension::pressure)},
+          {"poissons-ratio", "ν" + by_default(p.poissons_ratio, dimension::none)},
+          {"stiffening", "C of the exponential" + by_default(p.stiffening, dimension::none)},
+          {"relaxing-fraction", "share of μ that relaxes" + by_default(p.relaxing_fraction, dimension::none)},
+          {"relaxation-time", "τ" + by_default(p.relaxation_time, dimension::time)}})
       app.add_option(std::string("--") + flag, given_[flag], help_text)->option_text("VALUE");
     app.add_option("--damper", damper_, "exponential, literal, strang, backward_euler or none")
         ->option_text("NAME");
@@ -85,7 +104,7 @@ class Material : public Verb {
   ExitCode run(VerbContext& context) override {
     SkinParameters parameters;
     DamperScheme scheme = DamperScheme::exponential;
-    read_layer(parameters, scheme);
+    read_layer(parameters, scheme, context.progress);
     const MaterialProgram program = make_program();
     const MaterialPointRun run = run_material_point(parameters, scheme, program);
     std::error_code error;
@@ -101,10 +120,10 @@ class Material : public Verb {
   }
 
  private:
-  void read_layer(SkinParameters& p, DamperScheme& scheme) const {
+  void read_layer(SkinParameters& p, DamperScheme& scheme, Progress& progress) const {
     if (!scene_.empty()) {
       for (const std::string& text : settings_) check_setting(text);
-      const Scene scene = load_scene(scene_, settings_);
+      const Scene scene = load_scene_argument(scene_, settings_, progress);
       scheme = scene.time.damper;
       const auto& layers = scene.skin.layers;
       auto it = layers.begin();
@@ -138,7 +157,7 @@ class Material : public Verb {
     for (const Field& f : fields) {
       const std::string& text = given_.at(f.flag);
       if (text.empty()) continue;
-      const double value = parse_quantity(text, f.dimension, std::string("--") + f.flag);
+      const double value = given_quantity(text, f.dimension, std::string("--") + f.flag);
       if (!(value >= f.low && value <= f.high))
         throw InputError(std::string("--") + f.flag, text, f.expected);
       *f.value = value;
@@ -155,7 +174,7 @@ class Material : public Verb {
 
   static double duration(const std::string& text, const char* flag, double fallback) {
     if (text.empty()) return fallback;
-    const double value = parse_quantity(text, dimension::time, flag);
+    const double value = given_quantity(text, dimension::time, flag);
     if (!(value >= 0)) throw InputError(flag, text, "a time ≥ 0");
     return value;
   }
@@ -189,10 +208,10 @@ class Material : public Verb {
       throw InputError(uniaxial_ ? "--uniaxial"
                        : planar_ ? "--planar"
                                  : "--equibiaxial",
-                       std::to_string(target(0, 0)), "a stretch > 0");
+                       short_text(target(0, 0)), "a stretch > 0");
     double ramp = 0;
     if (!rate_.empty()) {
-      const double rate = parse_quantity(rate_, dimension::frequency, "--rate");
+      const double rate = given_quantity(rate_, dimension::frequency, "--rate");
       if (!(rate > 0)) throw InputError("--rate", rate_, "a rate > 0");
       ramp = std::fabs(amount) / rate;
     }
@@ -294,10 +313,11 @@ class Material : public Verb {
         [&](const auto& a, const auto& b) { return std::fabs(stress(a)) < std::fabs(stress(b)); });
     for (const auto& [label, s] : {std::pair{"peak", *peak}, {"last", run.states.back()}}) {
       char text[200];
-      std::snprintf(text, sizeof text,
-                    "%s: t = %.6g s, F11 = %.6g, J = %.6g, %s = %.6g Pa, stored energy %.6g kPa\n", label,
-                    s.time, s.deformation(0, 0), s.deformation.determinant(), loading_name().c_str(),
-                    1e6 * stress(s), 1e3 * s.energy);
+      std::snprintf(
+          text, sizeof text,
+          "%s: t = %.6g s, F1%d = %.6g, J = %.6g, %s = %.6g kPa, stored energy %.6g kPa (mJ/cm^3)\n", label,
+          s.time, loading_column() + 1, s.deformation(loading_row(), loading_column()),
+          s.deformation.determinant(), loading_name().c_str(), 1e3 * stress(s), 1e3 * s.energy);
       out << text;
     }
     out << "written: " << output_ << "/material.csv, " << output_ << "/material.json, " << output_

@@ -44,6 +44,7 @@ class Render : public Verb {
         "truth_motion.bin",
         "rhytid render data/scenes/demo/case.json -o run/demo"};
   }
+  bool takes_case() const override { return true; }
   void add_options(CLI::App& app) override {
     app.add_flag("--keep-motion", keep_motion_,
                  "film the truth_motion.bin that is in the folder, if it is of the same scene, instead of "

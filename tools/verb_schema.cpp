@@ -5,6 +5,7 @@
 
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
+#include "tools/step_table.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -13,27 +14,31 @@ namespace {
 class Schema : public Verb {
  public:
   VerbHelp help() const override {
-    return {
-        "schema",
-        "print the format of scenes, cases or experiments as JSON Schema, or as documentation",
-        "Prints the format of scene files, of experiments ('schema experiment'), or of case files ('schema "
-        "case', in the program that fits). "
-        "Validation, this schema and the documentation come from the same table of rules, so they agree. "
-        "Give "
-        "the schema to an editor for completion and checks while typing.",
-        "nothing",
-        "JSON Schema (draft 2020-12) on stdout; Markdown with --docs",
-        "rhytid schema > scene.schema.json"};
+    return {"schema",
+            "print the format of scenes, cases, experiments or steps.csv as JSON Schema or documentation",
+            "Prints the format of scene files, of experiments ('schema experiment'), of case files ('schema "
+            "case', in the program that fits), or "
+            "of the "
+            "table that simulate writes ('schema steps'). "
+            "Validation, this schema and the documentation come from the same table of rules, so they agree. "
+            "Give "
+            "the schema to an editor for completion and checks while typing.",
+            "nothing",
+            "JSON Schema (draft 2020-12) on stdout; Markdown with --docs",
+            "rhytid schema --docs"};
   }
   bool takes_file() const override { return false; }
   void add_options(CLI::App& app) override {
-    app.add_option("format", format_, "scene (default), experiment or case")->option_text("FORMAT");
+    app.add_option("format", format_,
+                   "scene (default), experiment, case, or steps: the columns of steps.csv (always Markdown)")
+        ->option_text("FORMAT");
     app.add_flag("--docs", as_documentation_, "the format as Markdown: every key, unit, range and default");
   }
 
   ExitCode run(VerbContext& context) override {
     std::vector<FileFormat> formats = {{"scene", scene_schema, scene_documentation}};
     formats.insert(formats.end(), context.program.formats.begin(), context.program.formats.end());
+    formats.push_back({"steps", {}, step_table_documentation});
     const auto chosen = std::find_if(formats.begin(), formats.end(),
                                      [this](const FileFormat& f) { return f.name == format_; });
     if (chosen == formats.end()) {
@@ -41,7 +46,7 @@ class Schema : public Verb {
       for (const FileFormat& f : formats) names += (names.empty() ? "" : ", ") + f.name;
       throw InputError("schema", "'" + format_ + "'", "one of " + names);
     }
-    if (as_documentation_) {
+    if (as_documentation_ || !chosen->json_schema) {
       context.out << chosen->documentation();
     } else {
       context.out << chosen->json_schema().dump(2) << '\n';

@@ -1,5 +1,6 @@
 // rhytid track: footage to tracks of skin points, with their uncertainty.
 #include <CLI/CLI.hpp>
+#include <sstream>
 
 #include "fitting/case.h"
 #include "sim/core/error.h"
@@ -19,25 +20,37 @@ class TrackVerb : public Verb {
         "covariance each; skin under the projected finger of the scene is masked. Run it before fit. With "
         "--video it works on any footage without a case.",
         "case.json with its footage, camera and scene; or a video",
-        "tracks.csv, overlay.mp4, overlay.png, track.json; beside rendered footage also the error against "
+        "tracks.csv, overlay.mp4 (overlay.avi where no H.264 encoder works), overlay.png, track.json; beside "
+        "rendered footage also the error against "
         "the truth",
         "rhytid track data/scenes/demo/case.json -o run/demo"};
   }
   bool file_is_optional() const override { return true; }
+  bool takes_case() const override { return true; }
   void add_options(CLI::App& app) override {
     app.add_option("--video", video_, "footage to track, in place of the case's")->option_text("FILE");
     app.add_option("--roi", roi_, "region of interest in the first frame, px")
         ->expected(4)
         ->delimiter(',')
         ->option_text("X,Y,W,H");
-    app.add_option("--max-tracks", max_tracks_, "at most this many tracks")->option_text("N");
-    app.add_option("--frames", frames_, "only the first N frames")->option_text("N");
+    app.add_option("--max-tracks", max_tracks_, "at most this many tracks")
+        ->option_text("N")
+        ->check(CLI::Range(1, 100000));
+    app.add_option("--frames", frames_, "only the first N frames")
+        ->option_text("N")
+        ->check(CLI::Range(1, 1000000));
+    app.add_option("--model", model_,
+                   "how the picture around a point may deform: affine (default), or translation for poor "
+                   "footage, as of faces")
+        ->option_text("MODEL")
+        ->check(CLI::IsMember({"affine", "translation"}));
   }
 
   ExitCode run(VerbContext& context) override {
     if (context.options.file.empty() && video_.empty())
       throw InputError("track", "neither a case nor --video", "one of the two");
-    if (frames_ < 0) throw InputError("--frames", std::to_string(frames_), "1 or more");
+    if (roi_.size() == 4 && !(roi_[0] >= 0 && roi_[1] >= 0 && roi_[2] >= 1 && roi_[3] >= 1))
+      throw InputError("--roi", roi_text(), "X,Y,W,H in px with a width and a height of at least 1");
     const std::string folder = context.output_folder();
     TrackJob job;
     if (context.options.file.empty()) {
@@ -50,13 +63,22 @@ class TrackVerb : public Verb {
     if (roi_.size() == 4)
       job.options.seeds.region = cv::Rect(static_cast<int>(roi_[0]), static_cast<int>(roi_[1]),
                                           static_cast<int>(roi_[2]), static_cast<int>(roi_[3]));
+    if (!model_.empty())
+      job.options.model =
+          model_ == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
     if (max_tracks_ > 0) job.options.seeds.max_tracks = max_tracks_;
     if (frames_ > 0) job.footage.last = frames_ - 1;
     return track_footage(job, folder, context.options.threads, context.progress, context.out);
   }
 
  private:
-  std::string video_;
+  std::string roi_text() const {
+    std::ostringstream text;
+    for (const double value : roi_) text << (text.tellp() > 0 ? "," : "") << value;
+    return text.str();
+  }
+
+  std::string video_, model_;
   std::vector<double> roi_;
   int max_tracks_ = 0, frames_ = 0;
 };

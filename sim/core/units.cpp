@@ -1,5 +1,6 @@
 #include "sim/core/units.h"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <charconv>
@@ -142,6 +143,9 @@ class UnitParser {
     return product;
   }
 
+  /// After a failure: the word that is no unit, if that was the reason.
+  std::string_view unknown() const { return unknown_; }
+
  private:
   void skip_spaces() {
     while (!rest_.empty() && (rest_.front() == ' ' || rest_.front() == '\t')) rest_.remove_prefix(1);
@@ -162,7 +166,10 @@ class UnitParser {
     const Unit* unit = nullptr;
     for (const Unit& candidate : units)
       if (candidate.name == rest_.substr(0, size)) unit = &candidate;
-    if (unit == nullptr) return {};
+    if (unit == nullptr) {
+      unknown_ = rest_.substr(0, size);
+      return {};
+    }
     rest_.remove_prefix(size);
     const bool has_power = take('^');
     const bool negative = has_power && take('-');
@@ -181,7 +188,7 @@ class UnitParser {
     return result;
   }
 
-  std::string_view rest_;
+  std::string_view rest_, unknown_;
 };
 
 /// The text in quotes, shortened and with control characters blanked so that a message stays one line.
@@ -196,8 +203,22 @@ struct Parsed {
   Unit unit;          ///< of the whole expression
 };
 
-/// Nothing when the text is not a finite number with an optional unit.
-std::optional<Parsed> parse(std::string_view text) {
+/// " (MPA is no unit, MPa is one)" for the middle of a message.
+std::string unknown_unit(std::string_view word) {
+  const auto is_like = [word](std::string_view name) {
+    return std::equal(word.begin(), word.end(), name.begin(), name.end(), [](char a, char b) {
+      return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
+    });
+  };
+  std::string text = " (" + std::string(word.substr(0, 20)) + " is no unit";
+  for (const Unit& unit : units)
+    if (is_like(unit.name)) return text + ", " + std::string(unit.name) + " is one)";
+  return text + ")";
+}
+
+/// Nothing when the text is not a finite number with an optional unit; `why` then says more, if more is
+/// known.
+std::optional<Parsed> parse(std::string_view text, std::string& why) {
   const std::string ascii = to_ascii(text);
   const char* begin = ascii.data();
   const char* end = begin + ascii.size();
@@ -209,8 +230,9 @@ std::optional<Parsed> parse(std::string_view text) {
   double number = 0;
   const auto [after, status] = std::from_chars(begin, end, number);
   if (status != std::errc() || !std::isfinite(number)) return {};
-  const std::optional<Unit> unit =
-      UnitParser(std::string_view(after, static_cast<size_t>(end - after))).parse();
+  UnitParser parser(std::string_view(after, static_cast<size_t>(end - after)));
+  const std::optional<Unit> unit = parser.parse();
+  if (!unit && !parser.unknown().empty()) why = unknown_unit(parser.unknown());
   if (!unit || !std::isfinite(number * unit->times / unit->over)) return {};
   return Parsed{number, *unit};
 }
@@ -218,15 +240,18 @@ std::optional<Parsed> parse(std::string_view text) {
 }  // namespace
 
 Quantity parse_quantity(std::string_view text, const std::string& where) {
-  const std::optional<Parsed> parsed = parse(text);
-  if (!parsed) throw InputError(where, quoted(text), "a number with a unit, e.g. \"20 kPa\" or \"8 mm\"");
+  std::string why;
+  const std::optional<Parsed> parsed = parse(text, why);
+  if (!parsed)
+    throw InputError(where, quoted(text) + why, "a number with a unit, e.g. \"20 kPa\" or \"8 mm\"");
   return {parsed->number * parsed->unit.times / parsed->unit.over, parsed->unit.dimension};
 }
 
 double parse_quantity(std::string_view text, Dimension expected, const std::string& where) {
   const std::string wanted = dimension_text(expected) + ", e.g. \"" + dimension_example(expected) + "\"";
-  const std::optional<Parsed> parsed = parse(text);
-  if (!parsed) throw InputError(where, quoted(text), wanted);
+  std::string why;
+  const std::optional<Parsed> parsed = parse(text, why);
+  if (!parsed) throw InputError(where, quoted(text) + why, wanted);
   if (parsed->unit.dimension != expected)
     throw InputError(where, quoted(text) + " (" + dimension_text(parsed->unit.dimension) + ")", wanted);
   return parsed->number * parsed->unit.times / parsed->unit.over;

@@ -163,15 +163,21 @@ LocatedJson read_file(const std::string& path, const std::string& mentioned_at, 
   return result;
 }
 
+/// Whether a list holds plain values: one behind the last may then be set and is appended.
+bool is_plain_list(const RuleNode* list) {
+  const RuleNode* item = list == nullptr ? nullptr : list->child("*");
+  return item != nullptr && item->rule != nullptr && item->rule->type == RuleType::string;
+}
+
 /// Index for a key in an address of a list: a number or a name.
 size_t item_index(const json& list, const std::string& key, const std::string& where,
-                  const std::string& pointer) {
+                  const std::string& pointer, bool may_append) {
   size_t index = 0;
   const auto [end, status] = std::from_chars(key.data(), key.data() + key.size(), index);
   if (status == std::errc() && end == key.data() + key.size()) {
-    if (index < list.size()) return index;
+    if (index < list.size() + (may_append ? 1 : 0)) return index;
     throw InputError(where, "item " + key.substr(0, 60) + " of " + shown_text(pointer),
-                     "an item below " + std::to_string(list.size()));
+                     "an item below " + std::to_string(list.size() + (may_append ? 1 : 0)));
   }
   if (const int named = find_named(list, key); named >= 0) return static_cast<size_t>(named);
   std::vector<std::string> names;
@@ -219,8 +225,11 @@ void apply_override(LocatedJson& target, const std::string& assignment, const st
   for (size_t i = 0; i < keys.size(); ++i) {
     std::string key = keys[i];
     const bool is_last = i + 1 == keys.size();
+    const bool may_append = is_last && is_plain_list(rule);
+    if (may_append && node->is_null()) *node = json::array();
     if (node->is_array()) {
-      const size_t index = item_index(*node, key, where, pointer);
+      const size_t index = item_index(*node, key, where, pointer, may_append && !value.json.is_null());
+      if (index == node->size()) node->push_back(nullptr);
       if (is_last && value.json.is_null()) {
         throw InputError(where, "null for an item of a list",
                          "a value (to drop an item, set the whole list)");

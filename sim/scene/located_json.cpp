@@ -85,6 +85,10 @@ class Builder {
     else if (const size_t bracket = message.find("] "); bracket != std::string::npos)
       message = message.substr(bracket + 2);
     std::replace(message.begin(), message.end(), '\n', ' ');
+    // The library forgets that a comma would do as well.
+    for (const char* bracket : {"expected '}'", "expected ']'"})
+      if (const std::string word = bracket; message.ends_with(word))
+        message.replace(message.size() - word.size(), word.size(), "expected ',' or " + word.substr(9));
     size_t index = std::min(byte > 0 ? byte - 1 : 0, text_.size());
     // Point to the beginning of the word that was not expected rather than to its end.
     if (!token.empty() && token.size() <= byte && byte <= text_.size() &&

@@ -52,7 +52,8 @@ void merge(LocatedJson& target, const LocatedJson& patch, const RuleNode& rules 
 LocatedJson read_with_extends(const std::string& path, const RuleNode& rules = scene_rule_tree());
 
 /// Applies "pointer=value": value is JSON or, failing that, a string ("4 MPa"); null removes the value. List
-/// items are addressed by number or by name; missing objects on the way are created.
+/// items are addressed by number or by name; missing objects on the way are created. In a list of strings
+/// the number behind the last appends.
 void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file,
                     const RuleNode& rules = scene_rule_tree());
 

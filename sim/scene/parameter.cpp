@@ -1,5 +1,6 @@
 #include "sim/scene/parameter.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -122,17 +123,24 @@ std::vector<Found> find_all(const Scene& scene) {
 }
 
 Found find(const Scene& scene, std::string_view address) {
-  const std::vector<Found> all = find_all(scene);
-  std::vector<std::string> addresses;
-  for (const Found& found : all) {
+  for (const Found& found : find_all(scene))
     if (found.address == address || filled(found.kind->pattern, std::to_string(found.item)) == address)
       return found;
-    addresses.push_back(found.address);
-  }
   const std::string file = scene.file.empty() ? "" : scene.file + ": ";
-  const std::string nearest = nearest_word(address, addresses);
   throw InputError(file + "parameter address", shown_json(std::string(address)),
-                   nearest.empty() ? "a scene with parameters" : "a fit-able scalar, nearest is " + nearest);
+                   expected_parameter(scene, address));
+}
+
+/// The rule of what an address points to, items of lists by whatever name; null when no scene has it.
+const Rule* rule_at(std::string_view address) {
+  if (!address.starts_with('/')) return nullptr;
+  const RuleNode* node = &scene_rule_tree();
+  for (const std::string& key : split_pointer(address, "")) {
+    const RuleNode* item = node->child("*");
+    node = item != nullptr ? item : node->child(key);
+    if (node == nullptr) return nullptr;
+  }
+  return node->rule;
 }
 
 ParameterSpec describe(const Scene& scene, const Found& found) {
@@ -151,6 +159,20 @@ ParameterSpec describe(const Scene& scene, const Found& found) {
 
 ParameterSpec describe_parameter(const Scene& scene, std::string_view address) {
   return describe(scene, find(scene, address));
+}
+
+std::string expected_parameter(const Scene& scene, std::string_view address) {
+  const std::string list = "'rhytid check SCENE --parameters' lists them";
+  const Rule* rule = rule_at(address);
+  const bool is_number = rule != nullptr && rule->type != RuleType::object && rule->type != RuleType::array;
+  const auto is_kind = [rule](const Kind& kind) { return rule->pointer == kind.pattern; };
+  if (is_number && std::none_of(std::begin(kinds), std::end(kinds), is_kind))
+    return "a scalar that can be fitted, which this one is not; " + list;
+  std::vector<std::string> addresses;
+  for (const Found& found : find_all(scene)) addresses.push_back(found.address);
+  const std::string nearest = nearest_word(address, addresses);
+  return nearest.empty() ? "a scene with parameters"
+                         : "a fit-able scalar, nearest is " + nearest + "; " + list;
 }
 
 std::vector<ParameterSpec> all_parameters(const Scene& scene) {

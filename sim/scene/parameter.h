@@ -32,6 +32,10 @@ struct ParameterSpec {
 /// nearest valid address of this scene when there is none.
 ParameterSpec describe_parameter(const Scene& scene, std::string_view address);
 
+/// What to say instead of an address that describe_parameter refuses, after "expected": the nearest one, or
+/// that the value it addresses is none of those that can be fitted.
+std::string expected_parameter(const Scene& scene, std::string_view address);
+
 /// Every fit-able scalar of the scene, in the order of the file.
 std::vector<ParameterSpec> all_parameters(const Scene& scene);
 

@@ -111,7 +111,9 @@ class Resolver {
                          "one of the two");
       if (!is_given && !rival_given && rule.needs_one_of_pair)
         throw InputError(where(place), "neither \"" + key + "\" nor \"" + rule.rival + "\"",
-                         "one of the two");
+                         "one of the two" + (rule.type == RuleType::path
+                                                 ? ", e.g. --set " + place.shown + "/" + key + "=PATH"
+                                                 : std::string()));
       const bool has_meaning = rule.needs.empty() || value.contains(rule.needs);
       if (is_given && !has_meaning)
         throw InputError(where(place.key(key)), shown_json(value[key]),

@@ -100,6 +100,8 @@ std::vector<std::string> scene_warnings(const Scene& scene) {
   for (const LayerScene& layer : scene.skin.layers) warn_of_layer(layer, scene, warnings);
   warn_of_wrinkling_stack(scene.skin, warnings);
   for (const ColliderScene& collider : scene.colliders) warn_of_collider(collider, scene.time, warnings);
+  if (scene.time.frames == 0)
+    warnings.push_back("/time/frames: 0, so that a run ends where it starts; give the number of frames");
   return warnings;
 }
 

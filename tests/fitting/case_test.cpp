@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "fitting/case_rules.h"
 #include "sim/core/error.h"
 #include "tests/support/small_scenes.h"
 
@@ -43,6 +44,27 @@ class CaseTest : public testing::Test {
 
   fs::path folder_;
 };
+
+TEST_F(CaseTest, SettingsGrowByTheNumberBehindTheLast) {
+  const std::string path = write("case.json", R"({"scene": "scene.json"})");
+  const Case c = load_case(path, {"/settings/0=/skin/order=3", "/settings/1=/time/frames=5"});
+  EXPECT_THAT(c.scene_settings, testing::ElementsAre("/skin/order=3", "/time/frames=5"));
+}
+
+TEST_F(CaseTest, ValuesOfTheSceneAreRefusedWithTheWayToSetThem) {
+  const std::string hint = error_of(R"({"scene": "scene.json", "settings": ["/time/frames=2"]})",
+                                    {"/skin/layers/film/thickness=0.2 mm"});
+  EXPECT_THAT(hint, HasSubstr("--set \"/settings/1=/skin/layers/film/thickness=0.2 mm\""));
+  EXPECT_THAT(error_of(R"({"extends": "scene.json"})"), HasSubstr("got a scene, expected a case"));
+  write("scene.json", R"({"skin": {"surface": {}, "layers": []}})");
+  EXPECT_THAT(error_of(R"({"scene": "scene.json"})"),
+              HasSubstr("e.g. --set /settings/0=/skin/surface/file=PATH"));
+}
+
+TEST(CaseRules, EveryKeyHasAMeaning) {
+  for (const std::vector<Rule>* rules : {&case_rules(), &scene_rules()})
+    for (const Rule& rule : *rules) EXPECT_FALSE(rule.doc.empty()) << rule.pointer;
+}
 
 TEST_F(CaseTest, DefaultsAreThoseOfTheStructs) {
   const Case c = load_case(write("case.json", R"({"scene": "scene.json"})"));

@@ -198,7 +198,7 @@ TEST(Fit, BadCasesAreRefusedInOneLine) {
   EXPECT_THAT(message([](FitInput& i) { i.options.gauge_layer = "bone"; }), HasSubstr("bone"));
   EXPECT_THAT(message([](FitInput& i) { i.options.optimiser = "magic"; }), HasSubstr("magic"));
   EXPECT_THAT(message([](FitInput& i) { i.tracks.tracks.clear(); }), HasSubstr("usable observations"));
-  EXPECT_THAT(message([](FitInput& i) { i.scene.time.frame_rate = 60; }), HasSubstr("frame rate"));
+  EXPECT_THAT(message([](FitInput& i) { i.scene.time.frame_rate = 60; }), HasSubstr("frame_rate is 60 1/s"));
 }
 
 }  // namespace

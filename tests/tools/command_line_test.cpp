@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <new>
 #include <sstream>
@@ -75,6 +76,29 @@ TEST(CommandLine, passes_common_options_to_the_verb) {
   EXPECT_EQ(seen.output, "results");
   EXPECT_EQ(seen.threads, 1);
   EXPECT_THAT(seen.settings, testing::ElementsAre("/time/frames=12", "/name=[\"a=b\", 2]"));
+}
+
+TEST(CommandLine, a_refused_command_leaves_no_empty_folders) {
+  namespace fs = std::filesystem;
+  const fs::path base = fs::path(testing::TempDir()) / "refused_command";
+  fs::remove_all(base);
+  const auto refuse = [](bool writes) {
+    return [writes](VerbContext& context) -> ExitCode {
+      const std::string folder = context.output_folder();
+      if (writes) std::ofstream(folder + "/kept.txt") << "x";
+      throw InputError("no");
+    };
+  };
+  const std::string inner = (base / "a" / "b").string();
+  EXPECT_EQ(run({"probe", "s.json", "-o", inner}, refuse(false)).code, 2);
+  EXPECT_FALSE(fs::exists(base));
+  fs::create_directories(base / "a");
+  EXPECT_EQ(run({"probe", "s.json", "-o", inner}, refuse(false)).code, 2);
+  EXPECT_TRUE(fs::exists(base / "a"));
+  EXPECT_FALSE(fs::exists(inner));
+  EXPECT_EQ(run({"probe", "s.json", "-o", inner}, refuse(true)).code, 2);
+  EXPECT_TRUE(fs::exists(inner + "/kept.txt"));
+  fs::remove_all(base);
 }
 
 TEST(CommandLine, set_does_not_swallow_the_file) {

@@ -32,8 +32,12 @@ expect 2 1 "^rhytid: error: schema: got 'nonsense', expected one of scene" schem
 case $(basename "$program") in
   rhytid) expect 0 0 '"title": "Rhytid case"' schema case
     expect 0 0 '`/fit/parameters/\*/address` \| string' schema case --docs ;;
-  *) expect 2 1 "^rhytid: error: schema: got 'case', expected one of scene, experiment$" schema case ;;
+  *) expect 2 1 "^rhytid: error: schema: got 'case', expected one of scene, experiment, steps$" schema case ;;
 esac
+expect 0 0 '^\| `iterations`' schema steps
+expect 2 1 "^rhytid: error: bench: got 'nope', expected one of stability" bench nope
+expect 2 1 '^rhytid: error: bench: got nothing' bench
+expect 2 1 '^rhytid: error: --uniaxial: got 0, expected a stretch > 0' material --uniaxial 0
 expect 2 1 '^rhytid: error: verb: got nothing'
 expect 2 1 "^rhytid: error: verb: got 'no-such-verb', expected one of .*doctor" no-such-verb
 expect 2 1 '^rhytid: error: .*--no-such-option' doctor --no-such-option

@@ -78,6 +78,16 @@ expect 2 1 '^rhytid: error: --parameters: .*/ligaments/sources/c/strength' \
 expect 2 1 '^rhytid: error: track: got neither a case nor --video, expected one of the two' track
 expect 2 1 '^rhytid: error: a/fit.json: cannot open' report a
 
+for verb in render track fit; do
+  expect 2 1 '^rhytid: error: scene.json: got a scene, expected a case, .* data/scenes/demo/case.json\)$' $verb scene.json -o a
+done
+expect 2 1 'got a value of the scene, .*: --set "/settings/1=/skin/order=3"$' fit case.json -o a --set /skin/order=3
+
+expect 2 1 '^rhytid: error: --max-tracks' track case.json -o a --max-tracks=-7
+expect 2 1 '^rhytid: error: --roi: got 0,0,0,0, expected' track case.json -o a --roi 0,0,0,0
+expect 2 1 '^rhytid: error: --model' track case.json -o a --model rigid
+expect 2 1 '/track/roi: got \[0.0,0.0,0.0,5.0\], expected' track case.json -o a --set '/track/roi=[0, 0, 0, 5]'
+
 # The main job, tracking included.
 expect 0 0 '^a/footage.avi: 5 frames at 20 Hz, 160 x 120 px' render case.json -o a
 written a footage.avi camera.yaml truth.json truth_tracks.csv truth_motion.bin frame_0000.png
@@ -122,6 +132,30 @@ rm -f a/fit.json a/report.html && mkdir a/report.html
 expect 1 1 'error: the fit is complete, but its report could not be written: a/report.html' fit case.json -o a
 record a >again.txt && cmp a.txt again.txt || fail "a finished fit changes when it is run again"
 rmdir a/report.html
+
+# The warp model, from the command line and from the case.
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o t --video a/footage.avi
+cp t/tracks.csv affine.csv
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o t --video a/footage.avi --model translation
+cp t/tracks.csv translation.csv
+cmp -s affine.csv translation.csv && fail "--model changes nothing"
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o t --video a/footage.avi --set /track/model=translation
+cmp -s t/tracks.csv translation.csv || fail "/track/model is not --model"
+expect 0 0 'overlay.avi where' track --help
+
+# Footage of another rate than the scene's.
+mkdir -p rate && cp a/camera.yaml rate && python3 - <<'PYTHON'
+lines = open("a/tracks.csv").read().splitlines()
+names = next(l for l in lines if not l.startswith("#")).split(",")
+out = []
+for line in lines:
+    cells = line.split(",")
+    if cells != names and not line.startswith("#"):
+        cells[names.index("time_s")] = repr(int(cells[names.index("frame")]) / 21)
+    out.append(",".join(cells))
+open("rate/tracks.csv", "w").write("\n".join(out) + "\n")
+PYTHON
+expect 2 1 "/time/frame_rate is 20 1/s, the footage's about 21 1/s$" fit case.json -o rate
 
 # Truth belongs to the rendered footage alone.
 expect 0 0 '^against the truth: .* reduced chi-square for a fit [0-9.]+' track case.json -o a

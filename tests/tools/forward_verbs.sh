@@ -61,12 +61,28 @@ PYTHON
 
 expect 0 0 '^  viscosity +left out: no layer relaxes$' check tiny.json --set /skin/layers/soft/relaxing_fraction=0
 expect 0 0 '^  residual at rest +0 N, exactly an equilibrium$' check tiny.json
+expect 0 0 '^  pictures +about .* more: 2 of each of 5 frames' check tiny.json
 expect 0 0 '^ +"unknowns": 135,$' check tiny.json --json
 /usr/bin/env python3 -c 'import json; json.load(open("out.txt"))' || fail "check --json is not JSON"
 expect 2 1 '^rhytid: error: no_such.json: got no_such.json, which does not exist, expected a readable scene file$' check no_such.json
 expect 2 1 '^rhytid: error: tiny.json \(--set\): /skin/layers/soft/thicknes: got .*, nearest is "thickness"$' check tiny.json --set /skin/layers/soft/thicknes=1
 expect 2 1 'elastic_patch/scene.json: /ligaments: got nothing, expected ligaments with at least one source$' heatmap "$source/data/scenes/elastic_patch/scene.json"
-expect 2 1 '^rhytid: error: .*head_forehead/give the mesh by --set /skin/surface/file=PATH: cannot be opened' check "$source/data/scenes/head_forehead/scene.json"
+expect 2 1 '/skin/surface: got neither "file" nor "grid", expected one of the two, e.g. --set /skin/surface/file=PATH$' check "$source/data/scenes/head_forehead/scene.json"
+
+expect 2 1 'youngs_modulus: got "1 MPA" \(MPA is no unit, MPa is one\), expected a pressure' check tiny.json --set '/skin/layers/soft/youngs_modulus=1 MPA'
+expect 0 0 '^/skin/layers/soft/youngs_modulus +0\.02 +MPa +0\.0001 +1000 +log$' check tiny.json --parameters
+expect 0 0 '"address": "/colliders/finger/friction/coefficient"' check tiny.json --parameters --json
+# A case is taken for its scene, with its settings and those of the command line; two files of one name stay apart.
+mkdir -p twin
+cat >twin/case.json <<'CASE'
+{"scene": "../tiny.json", "settings": ["/base/stiffness=2", "/skin/layers/soft/relaxing_fraction=0"],
+ "fit": {"parameters": [{"address": "/base/stiffness"}]}}
+CASE
+expect 0 1 '^twin/case.json is a case: this is its scene .*/tiny.json, with 2 of its settings$' check twin/case.json
+expect 0 1 '^  viscosity +left out: no layer relaxes$' check twin/case.json
+expect 0 1 '^  viscosity +yes' check twin/case.json --set /settings/1=/base/stiffness=3
+expect 0 1 '^  nodes +70 ' check twin/case.json --set /skin/layers/soft/order=1 --set /settings/2=/base/stiffness=3
+expect 2 1 '--set "/settings/4=/base/stiffness=3": got item 4 of /settings, expected an item below 3$' check twin/case.json --set /settings/4=/base/stiffness=3
 expect 2 1 "^rhytid: error: --output: got '/dev/null/x' .*, expected a folder that can be written$" simulate tiny.json -o /dev/null/x
 
 expect 0 any '^written to run_a: run.json, steps.csv' simulate tiny.json -o run_a "${small[@]}"
@@ -121,11 +137,21 @@ expect 0 any 'resumed after frame [2-9]' simulate tiny.json -o run_e "${small[@]
 for file in steps.csv frames.pvd surface.pvd state.bin frames/frame_0012.vtu surface/frame_0012.vtp; do
   cmp -s run_d/$file run_e/$file || fail "$file differs after a resume"
 done
+cp run_e/run.json before.json
+expect 0 0 '^tiny: complete already, 12 frames in run_e; nothing was changed$' simulate tiny.json -o run_e "${small[@]}" --resume --set /time/frames=12
+cmp -s before.json run_e/run.json || fail "resuming a complete run changed its record"
+expect 0 any '^rhytid: warning: nothing to resume in run_f: the run starts from the beginning$' simulate tiny.json -o run_f "${small[@]}" --resume --set /output/pictures=false --set /time/frames=1
+expect 0 any '^rhytid: warning: /time/frames: 0, ' simulate tiny.json -o run_f "${small[@]}" --set /output/pictures=false --set /time/frames=null --set /name=null
+grep -q '^tiny: 0 frames' out.txt || fail "an unnamed scene has no name: $(cat out.txt)"
 
 expect 0 any 'b from 1(\.[0-9]+)? to [34](\.[0-9]+)? 1/mm' heatmap tiny.json -o heat --weights --threads 1
 for file in heatmap.vtp heatmap.ply heatmap.csv heatmap.png weight_a.png weight_b.png; do
   [ -s heat/$file ] || fail "heatmap did not write $file"
 done
+expect 0 any '^rhytid: warning: ligament source b was moved by 30 mm to reach the inner surface$' heatmap tiny.json -o heat --threads 1 \
+  --set '/ligaments/sources/b/position=[3, 0, -31.5]'
+[ "$(ls heat)" = "$(printf 'heatmap.csv\nheatmap.ply\nheatmap.png\nheatmap.vtp')" ] || fail "shares of an earlier map stay: $(ls heat)"
+expect 0 any '1/mm' heatmap tiny.json -o heat --weights --threads 1
 head -1 heat/heatmap.csv | grep -q 'column,x_mm,y_mm,z_mm,b_per_mm,weight_a,weight_b' || fail "heatmap.csv header"
 cat >experiment.json <<'EXPERIMENT'
 {

@@ -102,8 +102,8 @@ TEST(MaterialVerb, RunsAndWritesTheClosedForm) {
   const std::string folder = testing::TempDir() + "material_verb";
   const Outcome o = run({"--uniaxial", "1.3", "--hold", "10 s", "--derivatives", "-o", folder});
   EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_THAT(o.out, HasSubstr("P11 = 4122.57 Pa"));
-  EXPECT_THAT(o.out, HasSubstr("P11 = 899.479 Pa"));
+  EXPECT_THAT(o.out, HasSubstr("P11 = 4.12257 kPa, stored energy "));
+  EXPECT_THAT(o.out, HasSubstr("P11 = 0.899479 kPa"));
   const std::string csv = read_file(folder + "/material.csv");
   EXPECT_THAT(csv, HasSubstr("dP11_d_youngs_modulus,dP11_d_poissons_ratio_MPa"));
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 + 240);
@@ -135,15 +135,28 @@ TEST(MaterialVerb, TakesTheLayerFromASceneAndFlagsOverIt) {
   const std::string folder = testing::TempDir() + "material_scene", scene = folder + ".json";
   write_file(scene, test::drag_scene(1, 1));
   const Outcome film = run({"--scene", scene, "--layer", "film", "--shear", "1", "-o", folder});
-  EXPECT_THAT(film.out, HasSubstr("P12 = 322896 Pa")) << film.err;  // 50 × 6457.91 Pa
+  EXPECT_THAT(film.out, HasSubstr("P12 = 322.896 kPa")) << film.err;  // 50 × 6457.91 Pa
   const Outcome changed =
       run({"--scene", scene, "--layer", "film", "--shear", "1", "--youngs-modulus", "20 kPa", "-o", folder});
-  EXPECT_THAT(changed.out, HasSubstr("P12 = 6457.91 Pa")) << changed.err;
+  EXPECT_THAT(changed.out, HasSubstr("P12 = 6.45791 kPa")) << changed.err;
   const Outcome wrong = run({"--scene", scene, "--layer", "fat", "--shear", "1", "-o", folder});
   EXPECT_EQ(wrong.code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("one of soft, film"));
   std::filesystem::remove_all(folder);
   std::filesystem::remove(scene);
+}
+
+TEST(MaterialVerb, PlainNumbersAreInInternalUnitsAsInScenes) {
+  const std::string folder = testing::TempDir() + "material_plain";
+  const Outcome plain = run({"--shear", "0.2", "--youngs-modulus", "0.05", "--relaxation-time", "0.1",
+                             "--rate", "2", "-o", folder});
+  const Outcome units = run({"--shear", "0.2", "--youngs-modulus", "50 kPa", "--relaxation-time", "100 ms",
+                             "--rate", "2 Hz", "-o", folder});
+  EXPECT_EQ(plain.code, 0) << plain.err;
+  EXPECT_EQ(plain.out, units.out);
+  EXPECT_THAT(plain.out, HasSubstr("F12 = 0.2, "));
+  EXPECT_THAT(run({"--help"}).out, HasSubstr("(default "));
+  std::filesystem::remove_all(folder);
 }
 
 TEST(MaterialVerb, RefusesBadFlags) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <regex>
 #include <sstream>
 #include <stdexcept>
 
@@ -36,6 +37,29 @@ struct Column {
     return rows.back()[at];
   }
 };
+
+TEST(StepTable, DocumentationNamesEveryColumn) {
+  // | `name` | unit | meaning |, with NAME for what the scene names.
+  std::vector<std::regex> known;
+  const std::string documentation = step_table_documentation();
+  const std::regex row(R"(\n\| `([A-Za-z_]+)`[^|]*\| ([^|]*) ?\|)");
+  for (std::sregex_iterator it(documentation.begin(), documentation.end(), row), end; it != end; ++it) {
+    std::string pattern = std::regex_replace((*it)[1].str(), std::regex("NAME"), "[a-z_]+");
+    pattern = std::regex_replace(pattern, std::regex("_x$"), "_[xyz]");
+    const std::string unit =
+        std::regex_replace(std::regex_replace((*it)[2].str(), std::regex("/"), "_per_"), std::regex(" "), "");
+    known.emplace_back(unit.empty() ? pattern : pattern + "_" + unit);
+  }
+  const SceneModel model(parse_scene_text(test::drag_scene(2, 1), "drag.json"));
+  const std::string text = StepTable(model.model()).table().text();
+  std::istringstream header(text.substr(0, text.find('\n')));
+  int columns = 0;
+  for (std::string name; std::getline(header, name, ','); ++columns)
+    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const std::regex& r) {
+      return std::regex_match(name, r);
+    })) << name;
+  EXPECT_GT(columns, 30);
+}
 
 Column parse(const std::string& csv) {
   Column result;

@@ -127,7 +127,7 @@ TEST(SceneErrors, NameFileKeyValueAndExpectation) {
        "a.json:23: /base/radius: got 0.0, expected a length > 0 mm, since the base is a sphere"},
       // Syntax: file, line and column.
       {"\"order\": 4,", "\"order\": 4",
-       "a.json:7:16: syntax error while parsing object - unexpected string literal; expected '}'"},
+       "a.json:7:16: syntax error while parsing object - unexpected string literal; expected ',' or '}'"},
       {"\"order\": 4", "\"order\": 4, \"order\": 3",
        "a.json:7: got the key \"order\" twice, expected each key once"},
   };
