@@ -69,7 +69,8 @@ TEST(SceneErrors, NameFileKeyValueAndExpectation) {
        "a.json:11: /skin/layers/soft/youngs_modulus: got \"20 mm\" (a length), expected a pressure, e.g. "
        "\"20 kPa\""},
       {"\"20 kPa\"", "\"20 kPaa\"",
-       "a.json:11: /skin/layers/soft/youngs_modulus: got \"20 kPaa\", expected a pressure, e.g. \"20 kPa\""},
+       "a.json:11: /skin/layers/soft/youngs_modulus: got \"20 kPaa\" (kPaa is no unit), expected a pressure, "
+       "e.g. \"20 kPa\""},
       {"\"80 %\"", "\"80 deg\"",
        "a.json:13: /skin/layers/film/relaxing_fraction: got \"80 deg\" (an angle), expected a plain number, "
        "e.g. "
@@ -195,6 +196,7 @@ TEST(SceneWarnings, NameWhatIsDoubtful) {
               ElementsAre(HasSubstr("moves 4.167 mm in one step")));
   EXPECT_THAT(warnings({"/colliders/table/path/0/time=9"}), ElementsAre(HasSubstr("never moves")));
   EXPECT_THAT(warnings({"/time/damper=literal"}), ::testing::SizeIs(2));
+  EXPECT_THAT(warnings({"/time/frames=0"}), ElementsAre(HasSubstr("/time/frames: 0")));
 }
 
 }  // namespace

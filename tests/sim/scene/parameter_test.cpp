@@ -90,12 +90,17 @@ TEST(Parameter, RefusesUnknownAddressesAndValues) {
   EXPECT_EQ(error_of([&] { describe_parameter(scene, "/skin/layers/film/young_modulus"); }),
             "a.json: parameter address: got \"/skin/layers/film/young_modulus\", expected a fit-able scalar, "
             "nearest "
-            "is /skin/layers/film/youngs_modulus");
+            "is /skin/layers/film/youngs_modulus; 'rhytid check SCENE --parameters' lists them");
   // Integers, what this scene does not have, and what is not fit-able.
-  for (const char* address :
-       {"", "/skin/order", "/colliders/table/radius", "/colliders/table/friction/coefficient",
-        "/skin/layers/2/stiffening", "/skin/layers/soft/thickness", "/base/stiffness/x"})
+  for (const char* address : {"", "/colliders/table/radius", "/colliders/table/friction/coefficient",
+                              "/skin/layers/2/stiffening", "/base/stiffness/x"})
     EXPECT_THAT(error_of([&] { get_parameter(scene, address); }), ::testing::HasSubstr("nearest is /"))
+        << address;
+  for (const char* address : {"/skin/order", "/skin/layers/soft/thickness", "/skin/layers/0/thickness"})
+    EXPECT_THAT(
+        error_of([&] { get_parameter(scene, address); }),
+        ::testing::AllOf(::testing::HasSubstr("expected a scalar that can be fitted, which this one is not"),
+                         ::testing::Not(::testing::HasSubstr("nearest"))))
         << address;
   EXPECT_EQ(error_of([&] { set_parameter(scene, "/skin/layers/soft/poissons_ratio", 0.5); }),
             "a.json: /skin/layers/soft/poissons_ratio: got 0.5, expected a number from 0 to 0.49999");

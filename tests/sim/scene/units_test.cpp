@@ -63,6 +63,9 @@ TEST(Units, RefusesWhatIsNoQuantity) {
         "1 1",    "1 2 mm", "nan",     "inf",       "-inf mm", "1e999 mm", "+-1 mm", "0x10 mm",
         "1,5 mm", "1 mm)",  "1 \n mm", "1 kkPa",    "1 KPa",   "1 mm^10"})
     EXPECT_THAT(error_of(text, dimension::length), HasSubstr("expected a length, e.g. \"8 mm\"")) << text;
+  EXPECT_THAT(error_of("1 MPA", dimension::pressure),
+              HasSubstr("\"1 MPA\" (MPA is no unit, MPa is one), expected"));
+  EXPECT_THAT(error_of("1 furlong", dimension::length), HasSubstr("(furlong is no unit), expected"));
   EXPECT_EQ(error_of("1\n2", dimension::length).find('\n'), std::string::npos);
 }
 
