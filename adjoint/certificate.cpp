@@ -71,6 +71,7 @@ class Certification {
   void duality();
   void taylor();
   void gauge();
+  void without_effect();
   void error_bar();
   void pivots();
   void repeatability();
@@ -220,6 +221,35 @@ void Certification::taylor() {
   }
 }
 
+/// That a parameter has no effect is the gradient's word. One run with all of them changed shows it, or that
+/// a path of the derivative is missing.
+void Certification::without_effect() {
+  if (report_.without_effect.empty()) return;
+  begin("parameters without effect", static_cast<int>(run_.steps.size()));
+  const ParameterSpace space(scene_model_, report_.without_effect);
+  CertificateCheck check{"no effect", 0, 0, Verdict::fail, ""};
+  const VectorXd small = VectorXd::Constant(space.size(), 1e-4);
+  const auto other = functional_->evaluate(space.native(small), {}, [this] { return tick(); });
+  if (stopped_) throw Stopped{};
+  check.figure = std::fabs(other.difference);
+  check.threshold = 100 * report_.noise;
+  if (!other.complete) {
+    check.verdict = Verdict::warning;
+    check.sentence = "the run with parameters changed by 0.01 % that have no effect failed: " + other.failure;
+  } else if (check.figure <= check.threshold) {
+    check.verdict = Verdict::pass;
+    check.sentence = text(
+        "%d parameters whose derivative is zero, changed by 0.01 %% together, change nothing", space.size());
+  } else {
+    check.sentence = text(
+        "%d parameters whose derivative is zero change the functional when they change by 0.01 %%: a part of "
+        "the "
+        "derivative is missing",
+        space.size());
+  }
+  add(check);
+}
+
 void Certification::gauge() {
   double sum = 0, terms = 0;
   int count = 0;
@@ -335,6 +365,7 @@ CertificateReport Certification::run() {
     duality();
     if (options_.displacement_output) gauge();
     taylor();
+    without_effect();
     error_bar();
     pivots();
     repeatability();

@@ -24,6 +24,7 @@ class ExperimentCost final : public ceres::CostFunction {
     const VectorXd t = Eigen::Map<const VectorXd>(parameters[0], problem_.num_parameters());
     // Runs are counted by their effect: an evaluation at the kept point costs none.
     if (problem_.counters().forward_runs >= max_evaluations_ && !(t == last_)) return false;
+    last_failed_ = true;
     const FitEvaluation& evaluation = problem_.evaluate(t);
     last_ = t;
     if (evaluation.failed) return false;
@@ -31,9 +32,13 @@ class ExperimentCost final : public ceres::CostFunction {
     const bool is_accepted = jacobians != nullptr && jacobians[0] != nullptr;
     // A better point is about to be accepted, and Ceres gives up when its Jacobian then cannot be had. So it
     // is formed here already (it is kept), where a failure only refuses the step.
-    if (!is_accepted) return evaluation.cost >= accepted_cost_ || problem_.jacobian(t).has_value();
+    if (!is_accepted) {
+      last_failed_ = evaluation.cost < accepted_cost_ && !problem_.jacobian(t).has_value();
+      return !last_failed_;
+    }
     const std::optional<MatrixXd> jacobian = problem_.jacobian(t);
     if (!jacobian) return false;
+    last_failed_ = false;
     accepted_cost_ = evaluation.cost;
     Eigen::Map<RowMajor>(jacobians[0], problem_.num_residuals(), problem_.num_parameters()) = *jacobian;
     gradient_norm_ = (jacobian->transpose() * evaluation.residuals).norm();
@@ -43,11 +48,14 @@ class ExperimentCost final : public ceres::CostFunction {
   /// |∂F/∂t| where the Jacobian was last formed: the accepted point. (Ceres reports the length of the
   /// projected gradient step instead, which a bound cuts.)
   double gradient_norm() const { return gradient_norm_; }
+  /// The last trial could not be run: steps then shrink until they pass for convergence.
+  bool last_failed() const { return last_failed_; }
 
  private:
   FitProblem& problem_;
   int max_evaluations_;
   mutable VectorXd last_;
+  mutable bool last_failed_ = false;
   mutable double gradient_norm_ = 0, accepted_cost_ = std::numeric_limits<double>::infinity();
 };
 
@@ -144,10 +152,12 @@ OptimiserOutcome fit_with_ceres(FitProblem& problem, const OptimiserOptions& opt
   else if (problem.best().size() == 0) {
     outcome.status = Status::failed;
     outcome.detail = "no run could be used: " + problem.last_failure();
-  } else if (summary.termination_type == ceres::CONVERGENCE)
+  } else if (summary.termination_type == ceres::CONVERGENCE && !cost.last_failed())
     outcome.status = Status::converged;
   else if (problem.counters().forward_runs >= last_run || summary.termination_type == ceres::NO_CONVERGENCE)
     outcome.status = Status::max_evaluations;
+  else if (cost.last_failed())
+    outcome.detail = "no step from the best point could be run: " + problem.last_failure();
   return outcome;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "fitting/identifiability.h"
+#include "fitting/spatial_misfit.h"
 #include "sim/core/error.h"
 #include "sim/scene/names.h"
 #include "sim/scene/parameter.h"
@@ -64,6 +65,23 @@ NoiseCheck check_noise(FitProblem& problem, const FitEvaluation& at, const Vecto
   check.autocorrelation = lag_one_autocorrelation(innovations, frames);
   check.widening = interval_widening(check.reduced_chi_square, check.autocorrelation);
   return check;
+}
+
+/// What neighbouring tracks err alike, scaled so that the quantile of all residuals' degrees of freedom gives
+/// the interval that the few independent patches allow.
+MatrixXd common_misfit(const FitProblem& problem, const FitProblem::Linearised& at, double quantile) {
+  MatrixXd scores(problem.num_parameters(), problem.compared().size());
+  std::vector<Vec2> pixels;
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < problem.compared().size(); ++i) {
+    const Eigen::Index n = problem.noise()[i].num_rows();
+    scores.col(static_cast<Eigen::Index>(i)) =
+        at.jacobian.middleRows(row, n).transpose() * at.residuals.segment(row, n);
+    pixels.push_back(problem.compared()[i].first);
+    row += n;
+  }
+  const double ratio = student_quantile_975(kMisfitDegrees) / quantile;
+  return ratio * ratio * spatial_score_covariance(scores, pixels);
 }
 
 /// Truth in the units of the held modulus: displacements only tell stiffnesses relative to it.
@@ -197,6 +215,17 @@ void add_notes(const FitProblem& problem, const FitInput& input, const FitEvalua
         "ratios are meaningful. Leave one Young's modulus out of the fitted parameters.");
 }
 
+/// Where the common misfit of neighbours decides the interval, and by how much.
+std::string which_are_wider(const Identifiability& by_noise, const Identifiability& found,
+                            const std::vector<FitVariable>& variables) {
+  std::string list;
+  for (int k = 0; k < static_cast<int>(variables.size()); ++k) {
+    const double ratio = found.sigma(k) / by_noise.sigma(k);
+    if (ratio > 1.0001) list += (list.empty() ? "" : ", ") + variables[k].name + number(" %.2f times", ratio);
+  }
+  return list.empty() ? "nowhere here" : "here " + list;
+}
+
 }  // namespace
 
 FitResult run_fit(const FitInput& input, const FitObserver& observer) {
@@ -245,6 +274,7 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
   if (problem.was_stopped()) {
     result.converged = false;
     result.status = "failed: stopped by the user";
+    result.stopped = true;
   }
   if (at != nullptr) {
     result.final_cost = at->cost;
@@ -261,20 +291,25 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
   if (linearised) {
     const NoiseCheck noise = check_noise(problem, *at, linearised->residuals);
     result.reduced_chi_square = noise.reduced_chi_square;
-    const Identifiability found(linearised->jacobian, problem.parametrisation().variables(), noise.widening);
     const double quantile = student_quantile_975(problem.degrees_of_freedom());
+    const std::vector<FitVariable>& variables = problem.parametrisation().variables();
+    const Identifiability found(linearised->jacobian, variables, noise.widening,
+                                common_misfit(problem, *linearised, quantile));
     add_parameters(problem, t, &found, quantile, truth, result);
     add_modulus_ratios(problem, found, t, quantile, truth, result);
     result.singular_values = found.singular_values();
     result.right_vectors = found.right_vectors();
     result.correlation = found.correlation();
     for (std::string& sentence : found.cannot_tell()) result.cannot_tell.push_back(std::move(sentence));
-    result.notes.push_back("95 % intervals: Student's t on " + std::to_string(problem.degrees_of_freedom()) +
-                           " degrees of freedom, standard deviations widened by " +
-                           number("%.3f", noise.widening) + " (reduced chi-square " +
-                           number("%.3f", noise.reduced_chi_square) +
-                           ", lag-1 autocorrelation of whitened residuals within tracks " +
-                           number("%.3f", noise.autocorrelation) + ").");
+    result.notes.push_back(
+        "95 % intervals: Student's t on " + std::to_string(problem.degrees_of_freedom()) +
+        " degrees of freedom, standard deviations widened by " + number("%.3f", noise.widening) +
+        " (reduced chi-square " + number("%.3f", noise.reduced_chi_square) +
+        ", lag-1 autocorrelation of whitened residuals within tracks " +
+        number("%.3f", noise.autocorrelation) +
+        "), or what neighbouring tracks err alike where that is more (" +
+        which_are_wider(Identifiability(linearised->jacobian, variables, noise.widening), found, variables) +
+        ").");
   } else {
     add_parameters(problem, t, nullptr, 0, truth, result);
     result.notes.push_back("No intervals: the run at the last values could not be differentiated.");

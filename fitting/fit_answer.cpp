@@ -30,7 +30,9 @@ Row table_row(const std::string& name, const std::string& unit, const std::strin
   }
   char error[32];
   std::snprintf(error, sizeof(error), "%+.1f", 100 * (value / *truth - 1));
-  row.insert(row.end(), {number(*truth), error, *truth >= low && *truth <= high ? "yes" : "no"});
+  // An interval that says nothing holds everything.
+  const char* inside = !determined ? "-" : *truth >= low && *truth <= high ? "yes" : "no";
+  row.insert(row.end(), {number(*truth), error, inside});
   return row;
 }
 

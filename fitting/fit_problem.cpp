@@ -62,6 +62,8 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& cam
       output_row_[i].push_back(2 * static_cast<int>(points_in_frame[f].size()));
       points_in_frame[f].push_back(static_cast<int>(i));
     }
+  if (options_.settle)  // in the order of the tracks, see first_prediction
+    for (std::size_t i = 0; i < compared_.size(); ++i) points_in_frame[0].push_back(static_cast<int>(i));
   for (const RegisteredTrack& r : registration_.tracks) points.push_back(r.point);
   prediction_.emplace(model_.model().mesh, std::move(points), camera, std::move(points_in_frame));
   for (int f = 0; f <= options_.frames; ++f) {
@@ -81,7 +83,7 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
   for (const RegisteredTrack& r : registration_.tracks) {
     const Track& track = tracks.tracks[r.track];
     check_times(track, options_.frame_rate);
-    ComparedTrack compared{r.track, {}, {}};
+    ComparedTrack compared{r.track, track.at(0)->pixel, {}, {}};
     std::vector<Eigen::Matrix2d> covariances;
     for (const Observation& o : track.observations) {
       if (o.status != TrackStatus::ok || o.frame < first || o.frame > options_.frames) continue;
@@ -124,13 +126,20 @@ void FitProblem::run(const VectorXd& t) {
   trajectory_.reset();
   difference_jacobians_.reset();
   evaluation_ = FitEvaluation();
-  native_ = model_.native(parametrisation_.scene(t));
+  was_stopped_ = was_stopped_ || (should_stop && should_stop());
+  if (was_stopped_) return fail("stopped");
+  try {
+    native_ = model_.native(parametrisation_.scene(t));
+  } catch (const InputError& error) {  // values that are allowed one by one but not together
+    return fail(error.what());
+  }
   std::optional<EvaluationLog::Record> record = log != nullptr ? log->find(Kind::run, t) : std::nullopt;
   if (record && record->failure.empty() && record->values.size() != num_predicted_) record.reset();
   const bool is_replayed = record.has_value();
   if (!record) {
     record = simulate_and_project();
-    if (log != nullptr && !was_stopped_) log->add(Kind::run, t, *record);
+    if (was_stopped_) return fail("stopped");
+    if (log != nullptr) log->add(Kind::run, t, *record);
   }
   const Bits bits(t.begin(), t.end());
   const bool is_known = without_derivative_.contains(bits);
@@ -203,6 +212,11 @@ void FitProblem::compare(const VectorXd& predicted) {
     VectorXd r(2 * c.frames.size());
     for (std::size_t j = 0; j < c.frames.size(); ++j)
       r.segment<2>(2 * j) = c.observed[j] - predicted.segment<2>(frame_row_[c.frames[j]] + output_row_[i][j]);
+    // Where frame 0 moves with the parameters, the track's own way since then is compared.
+    if (options_.settle) {
+      const Vec2 moved = predicted.segment<2>(first_prediction(i)) - c.first;
+      for (std::size_t j = 0; j < c.frames.size(); ++j) r.segment<2>(2 * j) += moved;
+    }
     if (!r.allFinite()) {
       fail("a tracked point left the view of the camera");
       return;
@@ -274,6 +288,9 @@ std::optional<std::vector<MatrixXd>> FitProblem::difference_jacobians(const Vect
     MatrixXd dr(2 * c.frames.size(), num_parameters());
     for (std::size_t j = 0; j < c.frames.size(); ++j)
       dr.middleRows<2>(2 * j) = -tangent->middleRows<2>(frame_row_[c.frames[j]] + output_row_[i][j]);
+    if (options_.settle)
+      for (std::size_t j = 0; j < c.frames.size(); ++j)
+        dr.middleRows<2>(2 * j) += tangent->middleRows<2>(first_prediction(i));
     result.push_back(std::move(dr));
   }
   difference_jacobians_ = std::move(result);
@@ -318,9 +335,11 @@ std::optional<VectorXd> FitProblem::gradient(const VectorXd& t) {
     std::vector<VectorXd> weights(frames() + 1);
     for (int f = 0; f <= frames(); ++f) weights[f] = VectorXd::Zero(prediction_->size(f));
     for (std::size_t i = 0; i < compared_.size(); ++i)
-      for (std::size_t j = 0; j < compared_[i].frames.size(); ++j)
-        weights[compared_[i].frames[j]].segment<2>(output_row_[i][j]) =
-            -evaluation_.tracks[i].gradient.segment<2>(2 * j);
+      for (std::size_t j = 0; j < compared_[i].frames.size(); ++j) {
+        const Vec2 gradient = evaluation_.tracks[i].gradient.segment<2>(2 * j);
+        weights[compared_[i].frames[j]].segment<2>(output_row_[i][j]) = -gradient;
+        if (options_.settle) weights[0].segment<2>(first_prediction(i)) += gradient;
+      }
     const adjoint::AdjointResult result =
         adjoint::adjoint_sweep(model_.model(), native_, *trajectory_, *prediction_, weights);
     return parametrisation_.native_directions(model_, t).transpose() * result.native_bar;

@@ -78,7 +78,8 @@ class FitProblem {
 
   /// Compared observations of a track in the order of its differences.
   struct ComparedTrack {
-    int track;  ///< index into the TrackSet
+    int track;   ///< index into the TrackSet
+    Vec2 first;  ///< its pixel in frame 0, where it was attached
     std::vector<int> frames;
     std::vector<Vec2> observed;
   };
@@ -112,6 +113,10 @@ class FitProblem {
   void compare(const VectorXd& predicted);
   void fail(const std::string& why);
   void find_best();
+  /// Row of a track's prediction in frame 0; only there when frame 0 is settled.
+  Eigen::Index first_prediction(std::size_t compared) const {
+    return frame_row_[0] + 2 * static_cast<Eigen::Index>(compared);
+  }
   bool is_current(const VectorXd& t) const { return t_.size() == t.size() && t_ == t; }
   /// ∂(observed − predicted)/∂t per track, [2n][parameters].
   std::optional<std::vector<MatrixXd>> difference_jacobians(const VectorXd& t);

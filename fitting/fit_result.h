@@ -43,6 +43,7 @@ struct FitResidual {
 struct FitResult {
   std::string case_name, case_file, optimiser, status;  ///< status: converged | max_evaluations | failed: ...
   bool converged = false;
+  bool stopped = false;  ///< by the user, before it ended: not an answer; not written
   std::vector<FittedParameter> parameters;
   std::vector<DerivedQuantity> derived;
   std::string gauge;  ///< sentence: what was held fixed and why

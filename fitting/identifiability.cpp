@@ -48,7 +48,7 @@ double student_within(double t, int v) {
 }  // namespace
 
 Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<FitVariable>& variables,
-                                 double widening)
+                                 double widening, const MatrixXd& misfit)
     : variables_(variables), scale_(VectorXd::Ones(jacobian.cols())), widening_(widening) {
   const int n = static_cast<int>(jacobian.cols());
   require(n == static_cast<int>(variables.size()), "Identifiability: one variable per column");
@@ -65,18 +65,26 @@ Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<Fit
     right_vectors_.col(i).cwiseAbs().maxCoeff(&largest);
     if (right_vectors_(largest, i) < 0) right_vectors_.col(i) *= -1;
   }
+  if (misfit.size() == 0) return;
+  require(misfit.rows() == n && misfit.cols() == n, "Identifiability: misfit by the parameters");
+  const MatrixXd v = scale_.asDiagonal() * right_vectors_;
+  misfit_ = v.transpose() * misfit * v;
 }
 
 double Identifiability::sigma(const VectorXd& g) const {
   const VectorXd part = right_vectors_.transpose() * scale_.cwiseProduct(g);
-  double variance = 0;
+  VectorXd by_noise = VectorXd::Zero(part.size()), by_misfit = by_noise;
   for (int i = 0; i < part.size(); ++i) {
-    if (i < rank_)
-      variance += std::pow(part[i] / singular_values_[i], 2);
-    else if (std::fabs(part[i]) > 1e-6 * scale_.cwiseProduct(g).norm())
+    if (i < rank_) {
+      by_noise[i] = part[i] / singular_values_[i];
+      by_misfit[i] = by_noise[i] / singular_values_[i];
+    } else if (std::fabs(part[i]) > 1e-6 * scale_.cwiseProduct(g).norm()) {
       return kInfinity;
+    }
   }
-  return widening_ * std::sqrt(variance);
+  const double noise = widening_ * by_noise.norm();
+  if (misfit_.size() == 0) return noise;
+  return std::max(noise, std::sqrt(std::max(0.0, by_misfit.dot(misfit_ * by_misfit))));
 }
 
 double Identifiability::sigma(int parameter) const {

@@ -3,6 +3,9 @@
 //
 //   Var(gᵀt) = w² Σ_i (v_iᵀ g)² / s_i²,   w = widening
 //
+// or, where that is more, gᵀ A⁻¹ B A⁻¹ g with A = JᵀJ and B what the misfits of neighbouring tracks have in
+// common (spatial_misfit.h).
+//
 // Columns of parameters without a transform are scaled by their range, so that one unit means "a factor e"
 // for log parameters and "the whole range" for plain ones.
 // Tests: tests/fitting/identifiability_test.cpp
@@ -19,8 +22,10 @@ namespace rhytid::fitting {
 class Identifiability {
  public:
   /// `jacobian` [residuals][parameters] of whitened residuals by t; `widening` multiplies all standard
-  /// deviations.
-  Identifiability(const MatrixXd& jacobian, const std::vector<FitVariable>& variables, double widening);
+  /// deviations. `misfit` [parameters][parameters] is B by t, scaled by the caller to the quantile it will
+  /// use; empty: none.
+  Identifiability(const MatrixXd& jacobian, const std::vector<FitVariable>& variables, double widening,
+                  const MatrixXd& misfit = {});
 
   const VectorXd& singular_values() const { return singular_values_; }  ///< of scaled J, descending
   const MatrixXd& right_vectors() const { return right_vectors_; }      ///< columns, scaled parameters
@@ -41,6 +46,7 @@ class Identifiability {
   std::vector<FitVariable> variables_;
   VectorXd scale_, singular_values_;
   MatrixXd right_vectors_;
+  MatrixXd misfit_;  ///< of the scaled parameters along the right vectors; may be empty
   double widening_;
   int rank_ = 0;
 };

@@ -16,6 +16,7 @@ struct ScaledObjective {
   std::vector<FitIteration>& history;
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
   VectorXd last_t = {};
+  bool last_failed = false;  ///< the wall answered: steps then shrink until they pass for convergence
 
   VectorXd t_of(const std::vector<double>& y) const {
     const VectorXd moved = start + scale.cwiseProduct(Eigen::Map<const VectorXd>(y.data(), y.size()));
@@ -24,7 +25,8 @@ struct ScaledObjective {
   }
 
   /// Beyond the feasible region: higher than the best by a slope that leads back to it.
-  double wall(const VectorXd& t, std::vector<double>& gradient) const {
+  double wall(const VectorXd& t, std::vector<double>& gradient) {
+    last_failed = true;
     const VectorXd from_best = (t - problem.best()).cwiseQuotient(scale);
     for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k] = 2 * from_best[k];
     return 2 * problem.best_cost() / unit + 1 + from_best.squaredNorm();
@@ -53,6 +55,7 @@ struct ScaledObjective {
                        .seconds = seconds.count(),
                        .values = {values.begin(), values.end()}});
     last_t = t;
+    last_failed = false;
     if (callback) callback(history.back());
     return cost / unit;
   }
@@ -118,6 +121,10 @@ OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& opt
   } catch (const std::runtime_error& error) {
     outcome.status = Status::failed;
     outcome.detail = std::string("NLopt: ") + error.what();
+  }
+  if (outcome.status == Status::converged && objective.last_failed) {
+    outcome.status = Status::failed;
+    outcome.detail = "no step from the best point could be run: " + problem.last_failure();
   }
   outcome.t = problem.best();
   return outcome;

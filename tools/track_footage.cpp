@@ -12,6 +12,7 @@
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
+#include "tools/footage_record.h"
 #include "tools/render/scene_masks.h"
 #include "tools/render/track_record.h"
 
@@ -82,7 +83,8 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
   const std::string motion = in(folder, "truth_motion.bin");
   std::error_code ignored;
   const fs::path beside = fs::path(folder) / fs::path(fitting::footage_path(c, folder)).filename();
-  if (fs::exists(motion, ignored) && fs::equivalent(job.footage.path, beside, ignored))
+  if (fs::exists(motion, ignored) && fs::equivalent(job.footage.path, beside, ignored) &&
+      is_truth_of(in(folder, "truth.json"), job.footage.path, ""))
     job.truth_motion = motion;
 
   const std::string path = fitting::camera_path(c, folder);
@@ -117,6 +119,7 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
   if (result.report.end == fitting::TrackerEnd::source_ended_early)
     progress.warning(job.footage.path + " ended after " + std::to_string(result.report.frames_processed) +
                      " of " + std::to_string(result.report.frames_asked) + " frames");
+  fs::remove(in(folder, "track.json"));  // it speaks of the tracks that are replaced now
   fitting::write_tracks(result.tracks, in(folder, "tracks.csv"));
 
   progress.stage("drawing the tracks over the footage", 0);
@@ -128,7 +131,9 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
   std::optional<TrackingError> error;
   if (camera && !job.truth_motion.empty())
     error = tracking_error(result.tracks, read_motion(job.truth_motion), *camera, job.noise);
-  write_file(in(folder, "track.json"), track_record(result.report, error).dump(2) + "\n");
+  nlohmann::json record = track_record(result.report, error);
+  record["footage"] = footage_record(job.footage.path);
+  write_file(in(folder, "track.json"), record.dump(2) + "\n");
   out << in(folder, "tracks.csv") << ": " << fitting::summary(result.report) << '\n';
   if (error) print_error(*error, out);
   return ExitCode::ok;

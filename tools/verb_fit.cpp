@@ -11,6 +11,7 @@
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
 #include "sim/scene/parameter.h"
+#include "tools/footage_record.h"
 #include "tools/report/write_report.h"
 #include "tools/track_footage.h"
 #include "tools/verb.h"
@@ -86,7 +87,10 @@ class Fit : public Verb {
     const std::string tracks = fitting::tracks_path(c, folder), camera = fitting::camera_path(c, folder);
     require_tracks_or_footage(c, tracks, folder);
     for (const std::string& warning : scene_warnings(scene)) progress.warning(warning);
-    if (!fs::exists(tracks)) {
+    const std::string footage = fitting::footage_path(c, folder);
+    const bool is_outdated = c.tracks.empty() && tracks_are_outdated(tracks, footage);
+    if (is_outdated) progress.note(footage + " has changed since " + tracks + " was made: tracking it again");
+    if (is_outdated || !fs::exists(tracks)) {
       const ExitCode tracked = track_first(c, tracks, folder, context);
       if (tracked != ExitCode::ok) return tracked;
     }
@@ -99,14 +103,24 @@ class Fit : public Verb {
                             .anew = anew_};
     adopt_camera_name(input, context);
     const std::string truth = (fs::path(folder) / "truth.json").string();
-    if (fs::exists(truth)) input.truth = fitting::read_truth(truth, input.scene);
+    if (is_truth_of(truth, footage, tracks))
+      input.truth = fitting::read_truth(truth, input.scene);
+    else if (fs::exists(truth))
+      progress.warning(truth + " is the truth of other footage: not compared");
 
     fitting::FitResult result = fitting::run_fit(input, observer(context, input.options));
+    if (result.stopped) {
+      progress.finish();
+      progress.note("stopped after " + std::to_string(result.forward_runs) +
+                    " forward runs. Results of an earlier fit in " + folder +
+                    " are as they were; the same command without --anew goes on from here");
+      return ExitCode::interrupted;
+    }
     result.case_name = c.name;
     result.case_file = recorded(c.file, folder);
     result.settings = context.options.settings;
     result.scene_file = recorded(c.scene, folder);
-    result.footage_file = recorded(fitting::footage_path(c, folder), folder);
+    result.footage_file = recorded(footage, folder);
     result.tracks_file = recorded(tracks, folder);
     result.camera_file = recorded(camera, folder);
     if (!input.truth.empty())

@@ -10,6 +10,7 @@
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "tools/footage_record.h"
 #include "tools/render/footage.h"
 #include "tools/render/skin_camera.h"
 #include "tools/render/skin_renderer.h"
@@ -61,14 +62,19 @@ class Render : public Verb {
 
     TwinRun twin = motion(context, truth, stride, in_folder("truth_motion.bin"));
     if (context.progress.interrupted()) return ExitCode::interrupted;
+    // From here on what the folder holds of an earlier truth is wrong; the new truth comes when its footage
+    // is there.
+    fs::remove(in_folder("truth.json"));
+    fs::remove(in_folder("truth_tracks.csv"));
     write_motion(twin.surface, in_folder("truth_motion.bin"));
     const fitting::Camera camera =
         c.camera.empty() ? automatic_camera(twin.surface, c.render.width, c.render.height, c.render.tilt)
                          : fitting::read_camera(c.camera);
     fitting::write_camera(camera, in_folder("camera.yaml"));
-    write_file(in_folder("truth.json"),
-               truth_record(fit, truth, stride, twin.surface.frames()).dump(2) + "\n");
     if (!film(context, c, truth.scene(), twin.surface, camera, folder)) return ExitCode::interrupted;
+    nlohmann::json record = truth_record(fit, truth, stride, twin.surface.frames());
+    record["footage"].update(footage_record(footage_in(c, folder)));
+    write_file(in_folder("truth.json"), record.dump(2) + "\n");
     if (twin.complete) return ExitCode::ok;
     context.progress.error("the truth's run ended early: " + twin.failure);
     return ExitCode::not_converged;
@@ -81,8 +87,7 @@ class Render : public Verb {
       kept.surface = read_motion(path);
       kept.complete = true;
       const int frames = truth.scene().time.frames / stride + 1;
-      if (kept.surface.scene == scene_to_json(truth.scene()).dump() && kept.surface.frames() == frames)
-        return kept;
+      if (kept.surface.scene == motion_identity(truth) && kept.surface.frames() == frames) return kept;
       context.progress.note("truth_motion.bin is of another scene or incomplete; simulating again");
     }
     return run_twin(truth, stride, context.progress);

@@ -37,4 +37,7 @@ class Digest {
   std::uint64_t state_ = 0xcbf29ce484222325ull;
 };
 
+/// Digest of a file's contents. Throws InputError when it cannot be read.
+std::string file_digest(const std::string& path);
+
 }  // namespace rhytid

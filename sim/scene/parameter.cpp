@@ -16,7 +16,8 @@ namespace rhytid {
 namespace {
 
 /// A kind of parameter. `member` is null when item i of this scene does not have it (no friction, a plane's
-/// radius); i is the index for the * of the pattern and unused without one.
+/// radius; a fraction or coefficient of zero leaves its physics out, so that no derivative would see it); i
+/// is the index for the * of the pattern and unused without one.
 struct Kind {
   const char* pattern;
   double lower, upper;
@@ -35,7 +36,10 @@ const Kind kinds[] = {
     {"/skin/layers/*/stiffening", 0.25, 100, log,
      [](Scene& s, size_t i) { return &s.skin.layers[i].stiffening; }},
     {"/skin/layers/*/relaxing_fraction", 0, 0.999, logit,
-     [](Scene& s, size_t i) { return &s.skin.layers[i].relaxing_fraction; }},
+     [](Scene& s, size_t i) {
+       double& fraction = s.skin.layers[i].relaxing_fraction;
+       return fraction > 0 && s.time.damper != DamperScheme::none ? &fraction : nullptr;
+     }},
     {"/skin/layers/*/relaxation_time", 1e-3, 1e2, log,
      [](Scene& s, size_t i) { return &s.skin.layers[i].relaxation_time; }},
     {"/skin/pre_stretch/stretch", 0.5, 2, log,
@@ -65,7 +69,8 @@ const Kind kinds[] = {
     {"/colliders/*/stiffness", 1e-3, 1e3, log, [](Scene& s, size_t i) { return &s.colliders[i].stiffness; }},
     {"/colliders/*/friction/coefficient", 1e-3, 5, log,
      [](Scene& s, size_t i) {
-       return s.colliders[i].friction ? &s.colliders[i].friction->coefficient : nullptr;
+       auto& friction = s.colliders[i].friction;
+       return friction && friction->coefficient > 0 ? &friction->coefficient : nullptr;
      }},
 };
 

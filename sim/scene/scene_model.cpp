@@ -12,7 +12,7 @@ namespace rhytid {
 
 SceneModel::SceneModel(Scene scene) : scene_(std::move(scene)) {
   model_.mesh = build_skin_mesh(scene_);
-  parts_.push_back(std::make_shared<SkinPart>());
+  parts_.push_back(std::make_shared<SkinPart>(scene_));
   if (scene_.ligaments) {
     ligaments_ = std::make_shared<LigamentPart>(scene_, model_.mesh);
     parts_.push_back(ligaments_);

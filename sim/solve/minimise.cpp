@@ -184,6 +184,12 @@ bool Minimisation::leave_along_negative_curvature(Iterate& next) {
       decreased = true;
     }
   }
+  // The objective's scales are those of its last evaluation, a rejected trial further out: tolerances follow
+  // them.
+  if (decreased) {
+    next = evaluate(objective_, next.q);
+    ++report_.evaluations;
+  }
   return decreased;
 }
 

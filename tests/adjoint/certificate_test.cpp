@@ -172,6 +172,30 @@ TEST(Certificate, NoticesConsistentlyWrongSweeps) {
   }
 }
 
+// Whoever is under test may not decide what is left out of the test.
+TEST(Certificate, NoticesAMissingDerivative) {
+  const CertifiedCase& c = small_case();
+  CertificateOptions options;
+  options.addresses = {"/ligaments/sources/left/strength", "/skin/layers/film/youngs_modulus"};
+  options.adjoint = [](const Model& model, const auto&... rest) {
+    AdjointResult result = adjoint_sweep(model, rest...);
+    const NativeBlock& b = model.native_block("ligaments/b");
+    result.native_bar.segment(b.offset, b.size).setZero();
+    return result;
+  };
+  options.tangent = [](const Model& model, const VectorXd& native, const Trajectory& run,
+                       const Output& output, MatrixXd directions) {
+    const NativeBlock& b = model.native_block("ligaments/b");
+    directions.middleRows(b.offset, b.size).setZero();
+    return tangent_sweep(model, native, run, output, directions);
+  };
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  EXPECT_EQ(report.without_effect, std::vector<std::string>{"/ligaments/sources/left/strength"});
+  EXPECT_EQ(check(report, "duality").verdict, Verdict::pass);
+  EXPECT_EQ(check(report, "no effect").verdict, Verdict::fail);
+  EXPECT_FALSE(report.passed());
+}
+
 TEST(Certificate, NoticesSweepsThatDoNotRepeat) {
   const CertifiedCase& c = small_case();
   CertificateOptions options;
@@ -204,6 +228,13 @@ TEST(Certificate, ParametersWithoutEffectAreNamed) {
   ASSERT_TRUE(c.run.complete) << c.run.failure;
   const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights);
   EXPECT_THAT(report.without_effect, testing::Contains("/skin/layers/film/relaxation_time"));
+  EXPECT_EQ(check(report, "no effect").verdict, Verdict::pass);
+  // Zero leaves the branch out: there is no such parameter, and a scene that has one is another model.
+  EXPECT_THROW((void)describe_parameter(c.scene_model.scene(), "/skin/layers/film/relaxing_fraction"),
+               InputError);
+  Scene other = c.scene_model.scene();
+  other.skin.layers[1].relaxing_fraction = 0.5;
+  EXPECT_THROW((void)c.scene_model.native(other), InputError);
   CertificateOptions nothing;
   nothing.addresses = {"/skin/layers/film/relaxation_time"};
   EXPECT_FALSE(certify(c.scene_model, c.run, *c.output, c.weights, nothing).passed());

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <cmath>
 #include <numeric>
 #include <random>
 
+#include "fitting/spatial_misfit.h"
 #include "fitting/track_noise.h"
 
 namespace rhytid::fitting {
@@ -92,7 +94,7 @@ TEST(Identifiability, DirectionsOfManyParametersHaveNames) {
 // Intervals as a fit makes them, over repeated noise of exactly the stated kind, in a problem that is linear:
 // tracks with a common first error and their own ones, whitened by TrackNoise, widened as a fit does.
 TEST(Identifiability, IntervalsHoldTheTruthAsOftenAsTheySay) {
-  constexpr int kTracks = 12, kFrames = 8, kParameters = 3, kRepeats = 1500;
+  constexpr int kTracks = 36, kFrames = 8, kParameters = 3, kRepeats = 1500;
   constexpr double kFirst = 0.03, kOwn = 0.05;  // px
   const Eigen::Matrix2d first = kFirst * kFirst * Eigen::Matrix2d::Identity();
   const std::vector<Eigen::Matrix2d> later(kFrames, kOwn * kOwn * Eigen::Matrix2d::Identity());
@@ -133,8 +135,17 @@ TEST(Identifiability, IntervalsHoldTheTruthAsOftenAsTheySay) {
       std::iota(frames.begin(), frames.end(), 1);
       const double squares = z.squaredNorm() / dof;
       const double rho = lag_one_autocorrelation(innovations, std::vector<std::vector<int>>(kTracks, frames));
-      const Identifiability found(j, variables({"a", "b", "c"}), interval_widening(squares, rho));
       const double quantile = student_quantile_975(dof);
+      MatrixXd scores(kParameters, kTracks);
+      std::vector<Vec2> pixels;
+      const int rows = noise.num_rows();
+      for (int i = 0; i < kTracks; ++i) {
+        scores.col(i) = j.middleRows(i * rows, rows).transpose() * z.segment(i * rows, rows);
+        pixels.emplace_back(i % 6, i / 6);
+      }
+      const double ratio = student_quantile_975(kMisfitDegrees) / quantile;
+      const Identifiability found(j, variables({"a", "b", "c"}), interval_widening(squares, rho),
+                                  ratio * ratio * spatial_score_covariance(scores, pixels));
       for (int k = 0; k < kParameters; ++k) inside += std::fabs(t[k]) <= quantile * found.sigma(k);
       chi += squares / kRepeats;
       width += interval_widening(squares, rho) / kRepeats;
@@ -181,6 +192,71 @@ TEST(Identifiability, AutocorrelationOfAnAutoregressiveProcess) {
   for (auto& list : frames)
     for (int& f : list) f *= 2;  // no neighbours
   EXPECT_EQ(lag_one_autocorrelation(series, frames), 0);
+}
+
+// Errors of a model are alike at neighbouring points: a smooth random field besides the noise. Intervals from
+// the noise alone then hold the truth too seldom.
+TEST(Identifiability, NeighboursThatErrAlikeWidenTheIntervals) {
+  constexpr int kSide = 14, kTracks = kSide * kSide, kParameters = 3, kRepeats = 400, kWaves = 60;
+  constexpr double kField = 1, kLength = 0.12;  // in standard deviations of the noise; of the picture's side
+  std::mt19937 rng(6);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> phase(0, 2 * 3.141592653589793);
+  int by_noise = 0, by_both = 0;
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    std::vector<Vec2> pixels;
+    for (int i = 0; i < kTracks; ++i)
+      pixels.emplace_back(double(i % kSide) / kSide, double(i / kSide) / kSide);
+    // Gaussian fields with covariance exp(−d²/2L²), as sums of random waves: sensitivities and the model's
+    // error.
+    const auto field = [&](double length) {
+      VectorXd values = VectorXd::Zero(kTracks);
+      for (int w = 0; w < kWaves; ++w) {
+        const Vec2 wave(normal(rng) / length, normal(rng) / length);
+        const double shift = phase(rng);
+        for (int i = 0; i < kTracks; ++i)
+          values[i] += std::sqrt(2. / kWaves) * std::cos(wave.dot(pixels[i]) + shift);
+      }
+      return values;
+    };
+    MatrixXd j(kTracks, kParameters);
+    for (int k = 0; k < kParameters; ++k) j.col(k) = field(0.25);
+    VectorXd z = kField * field(kLength);
+    for (double& x : z) x += normal(rng);
+    const VectorXd t = j.householderQr().solve(z);  // the truth is 0
+    const VectorXd left = z - j * t;
+    const int dof = kTracks - kParameters;
+    const double widening = interval_widening(left.squaredNorm() / dof, 0),
+                 quantile = student_quantile_975(dof);
+    const double ratio = student_quantile_975(kMisfitDegrees) / quantile;
+    const MatrixXd scores = j.transpose() * left.asDiagonal();
+    const auto names = variables({"a", "b", "c"});
+    const Identifiability noise(j, names, widening),
+        both(j, names, widening, ratio * ratio * spatial_score_covariance(scores, pixels));
+    for (int k = 0; k < kParameters; ++k) {
+      by_noise += std::fabs(t[k]) <= quantile * noise.sigma(k);
+      by_both += std::fabs(t[k]) <= quantile * both.sigma(k);
+    }
+  }
+  const double total = kRepeats * kParameters;
+  std::printf(
+      "%.1f %% of intervals from the noise alone hold the truth, %.1f %% of those that see neighbours\n",
+      100 * by_noise / total, 100 * by_both / total);
+  EXPECT_LT(by_noise / total, 0.75);
+  EXPECT_GT(by_both / total, 0.82);
+}
+
+TEST(SpatialMisfit, IsASumOverPairsThatNeverTurnsNegative) {
+  const MatrixXd scores = random_matrix(3, 40, 1);
+  std::vector<Vec2> pixels;
+  for (int i = 0; i < 40; ++i) pixels.emplace_back((7 * i) % 40, (11 * i) % 37);
+  const MatrixXd b = spatial_score_covariance(scores, pixels);
+  EXPECT_GE(b.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), 0);
+  // Far apart, tracks count each for itself.
+  const std::vector<Vec2> far = {Vec2(0, 0), Vec2(100, 0), Vec2(0, 100), Vec2(100, 100)};
+  const MatrixXd four = scores.leftCols(4), sum = four * four.transpose();
+  EXPECT_LT((spatial_score_covariance(four, far) - 16. / 15 * sum).norm(), 1e-13 * sum.norm());
+  EXPECT_EQ(spatial_score_covariance(four, std::vector<Vec2>(4, Vec2(1, 1))).norm(), 0);
 }
 
 }  // namespace

@@ -163,4 +163,31 @@ expect 0 0 '^against the truth: .* reduced chi-square for a fit [0-9.]+' track c
 cp a/footage.avi other.avi
 expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o a --video other.avi
 grep -q 'against the truth' out.txt && fail "another video was compared with the truth"
+
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o a
+
+# Other footage under the same name: its tracks are made again, and compared with its own truth.
+expect 0 0 '^a/footage.avi: 5 frames' render case.json -o a --set '/truth/settings/0=/colliders/finger/friction/coefficient=0.3'
+expect 0 0 'a/footage.avi has changed since a/tracks.csv was made: tracking it again' fit case.json -o a
+grep -qE '^finger friction coefficient .* 0\.3 +[-+][0-9.]+ +(yes|no)$' out.txt || fail "not the new truth: $(cat out.txt)"
+python3 - <<'PYTHON' || fail "the fit did not see the new footage"
+import json
+value = json.load(open("a/fit.json"))["parameters"][0]["value"]
+raise SystemExit(not 0.2 < value < 0.45)
+PYTHON
+cp a/footage.avi a/new.avi && cp other.avi a/footage.avi
+expect 0 0 'a/truth.json is the truth of other footage: not compared' fit case.json -o a
+
+# Stopped by the user: what an earlier fit found stays.
+cp a/fit.json before.json
+"$program" fit case.json -o a --anew --threads 1 >out.txt 2>err.txt &
+pid=$!
+for _ in $(seq 3000); do grep -q '^run 1' err.txt && break; sleep 0.01; done
+kill -INT $pid
+wait $pid
+code=$?
+[ "$code" = 4 ] || fail "interrupted fit: exit $code: $(cat err.txt)"
+cmp a/fit.json before.json || fail "an interrupted fit wrote over an answer"
+grep -q 'stopped after [0-9]* forward runs' err.txt || fail "no word about stopping: $(cat err.txt)"
+[ "$(grep -c 'failed' err.txt)" = 0 ] || fail "runs that were not made are called failed: $(cat err.txt)"
 exit $((failures > 0))

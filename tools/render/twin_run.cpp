@@ -4,6 +4,7 @@
 
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
+#include "sim/time/model_digest.h"
 
 namespace rhytid::tools {
 
@@ -21,10 +22,14 @@ int frame_stride(const Scene& fit, const Scene& truth) {
   return static_cast<int>(stride);
 }
 
+std::string motion_identity(const SceneModel& truth) {
+  return scene_to_json(truth.scene()).dump() + " contents " + content_digest(truth.model());
+}
+
 TwinRun run_twin(const SceneModel& truth, int stride, Progress& progress) {
   const Model& model = truth.model();
   TwinRun out;
-  out.surface = outer_surface(model.mesh, scene_to_json(truth.scene()).dump());
+  out.surface = outer_surface(model.mesh, motion_identity(truth));
   out.surface.times.push_back(0);
   out.surface.displacements.push_back(VectorXd::Zero(3 * model.mesh.num_columns));
 

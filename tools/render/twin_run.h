@@ -16,6 +16,9 @@ Scene truth_scene(const fitting::Case& c);
 /// integer.
 int frame_stride(const Scene& fit, const Scene& truth);
 
+/// What names a motion in truth_motion.bin: the scene and the contents of the files behind it.
+std::string motion_identity(const SceneModel& truth);
+
 struct TwinRun {
   MovingSurface surface;  ///< frames 0, stride, 2·stride, ... as far as they were reached
   bool complete = false;  ///< every frame was reached

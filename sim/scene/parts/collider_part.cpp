@@ -1,5 +1,6 @@
 #include "sim/scene/parts/collider_part.h"
 
+#include "sim/core/error.h"
 #include "sim/scene/collider_motion.h"
 #include "sim/terms/contact_law.h"
 #include "sim/terms/geometry.h"
@@ -32,7 +33,10 @@ void add_orientation_slots(const ColliderScene& c, const ColliderMotion& motion,
 }  // namespace
 
 ColliderPart::ColliderPart(const Scene& scene) {
-  for (const ColliderScene& c : scene.colliders) built_radii_.push_back(collider_radius(c));
+  for (const ColliderScene& c : scene.colliders) {
+    built_radii_.push_back(collider_radius(c));
+    built_friction_.push_back(has_friction(c));
+  }
 }
 
 void ColliderPart::add_native_blocks(const Scene& scene, Model& model) const {
@@ -85,6 +89,9 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
 void ColliderPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
   for (std::size_t k = 0; k < scene.colliders.size(); ++k) {
     const ColliderScene& c = scene.colliders[k];
+    if (has_friction(c) && !built_friction_[k])
+      throw InputError(scene.file + ": /colliders/" + c.name + "/friction/coefficient",
+                       std::to_string(c.friction->coefficient), "0, with which this model was built");
     const int at = model.native_block("collider/" + c.name).offset;
     native[at] = c.stiffness;
     native[at + 1] = collider_radius(c) - built_radii_[k];

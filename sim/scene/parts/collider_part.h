@@ -21,6 +21,7 @@ class ColliderPart final : public ScenePart {
 
  private:
   std::vector<double> built_radii_;  // mm, 0 for shapes without one
+  std::vector<bool> built_friction_;
 };
 
 }  // namespace rhytid

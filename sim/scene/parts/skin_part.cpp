@@ -100,6 +100,10 @@ SkinMesh build_skin_mesh(const Scene& scene) {
   return mesh;
 }
 
+SkinPart::SkinPart(const Scene& scene) {
+  for (const LayerScene& l : scene.skin.layers) built_relaxing_.push_back(relaxing_part(scene, l) > 0);
+}
+
 void SkinPart::add_native_blocks(const Scene& scene, Model& model) const {
   for (const LayerScene& l : scene.skin.layers)
     add_native_block(model, "layer/" + l.name, 5, {SkinTheta::mu_inf, SkinTheta::bulk, SkinTheta::mu_m});
@@ -151,7 +155,12 @@ void SkinPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
 }
 
 void SkinPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
-  for (const LayerScene& l : scene.skin.layers) {
+  for (std::size_t k = 0; k < scene.skin.layers.size(); ++k) {
+    const LayerScene& l = scene.skin.layers[k];
+    // Such a term would lose the part of its stiffness that relaxes.
+    if (relaxing_part(scene, l) > 0 && !built_relaxing_[k])
+      throw InputError(scene.file + ": /skin/layers/" + l.name + "/relaxing_fraction",
+                       std::to_string(l.relaxing_fraction), "0, with which this model was built");
     const int at = model.native_block("layer/" + l.name).offset;
     const double f = relaxing_part(scene, l), mu = shear_modulus(l);
     native[at + SkinTheta::mu_inf] = (1 - f) * mu;

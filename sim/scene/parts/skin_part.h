@@ -13,11 +13,15 @@ SkinMesh build_skin_mesh(const Scene& scene);
 
 class SkinPart final : public ScenePart {
  public:
+  explicit SkinPart(const Scene& scene);
   void add_native_blocks(const Scene& scene, Model& model) const override;
   void add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const override;
   void set_native(const Scene& scene, const Model& model, VectorXd& native) const override;
   bool add_derivative(const Scene& scene, const Model& model, const std::string& address,
                       VectorXd& derivative) const override;
+
+ private:
+  std::vector<bool> built_relaxing_;  // per layer: its term has a Maxwell branch
 };
 
 }  // namespace rhytid

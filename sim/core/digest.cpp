@@ -1,0 +1,23 @@
+#include "sim/core/digest.h"
+
+#include <fstream>
+#include <vector>
+
+#include "sim/core/error.h"
+
+namespace rhytid {
+
+std::string file_digest(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(path, "cannot be opened", "a readable file");
+  Digest d;
+  std::vector<char> block(1 << 20);
+  while (file) {
+    file.read(block.data(), static_cast<std::streamsize>(block.size()));
+    d.bytes(block.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  if (file.bad()) throw InputError(path, "cannot be read to its end", "a readable file");
+  return d.hex();
+}
+
+}  // namespace rhytid
