@@ -99,6 +99,7 @@ EvaluationLog::EvaluationLog(std::string folder, const FitIdentity& identity, bo
     const std::string reason = anew ? "not wanted" : difference(found, identity);
     if (!reason.empty()) move_old(reason);
   }
+  if (!anew && !fs::exists(folder_, error)) take_back(identity);
   fs::create_directories(folder_, error);
   if (error || !fs::is_directory(folder_))
     throw InputError(folder_, "no folder (" + error.message() + ")", "a folder that can be written");
@@ -115,6 +116,37 @@ void EvaluationLog::move_old(const std::string& reason) {
     throw InputError(folder_, "a log of another fit that cannot be moved (" + error.message() + ")",
                      "a folder that can be written");
   set_aside_ = "evaluations of an earlier fit (" + reason + ") are set aside in " + old;
+}
+
+void EvaluationLog::take_back(const FitIdentity& identity) {
+  fs::path path = fs::path(folder_).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  const fs::path parent = path.has_parent_path() ? path.parent_path() : ".";
+  const std::string prefix = path.filename().string() + ".old";
+  std::vector<fs::path> candidates;
+  std::error_code error;
+  for (fs::directory_iterator entry(parent, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with(prefix) && name.find_first_not_of("0123456789", prefix.size()) == std::string::npos)
+      candidates.push_back(entry->path());
+  }
+  // Of several the one that was used last.
+  std::sort(candidates.begin(), candidates.end(), [](const fs::path& a, const fs::path& b) {
+    std::error_code ignored;
+    return fs::last_write_time(a, ignored) > fs::last_write_time(b, ignored);
+  });
+  for (const fs::path& old : candidates) {
+    const fs::path mark = old / "identity.json";
+    std::error_code absent;
+    if (!fs::is_regular_file(mark, absent)) continue;
+    if (!difference(ordered_json::parse(read_file(mark.string()), nullptr, false), identity).empty())
+      continue;
+    fs::rename(old, path, absent);
+    if (absent) continue;
+    set_aside_ += (set_aside_.empty() ? "" : "; ") + std::string("those of this fit are taken back from ") +
+                  old.string();
+    return;
+  }
 }
 
 void EvaluationLog::read_index() {

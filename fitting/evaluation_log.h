@@ -7,7 +7,7 @@
 //           a line of JSON, then t and the values as doubles in this machine's byte order
 //
 // A file appears whole or not at all. A log of another identity is set aside as FOLDER.old (.old2, …), never
-// mixed in. Tests: tests/fitting/resume_test.cpp
+// mixed in, and taken back when its fit is asked for again. Tests: tests/fitting/resume_test.cpp
 #pragma once
 
 #include <functional>
@@ -46,7 +46,7 @@ class EvaluationLog {
   /// InputError when the folder cannot be made.
   EvaluationLog(std::string folder, const FitIdentity& identity, bool anew = false);
 
-  /// What happened to an older log that was not used, one line; empty when there was none.
+  /// What became of older logs that were set aside or taken back, one line; empty when there were none.
   const std::string& set_aside() const { return set_aside_; }
   int num_runs() const { return num_runs_; }  ///< forward runs found on opening
 
@@ -60,6 +60,8 @@ class EvaluationLog {
  private:
   using Key = std::pair<Kind, std::string>;  ///< kind and the bytes of t
   void move_old(const std::string& reason);
+  /// Where a log of this identity was set aside earlier, it becomes the log again.
+  void take_back(const FitIdentity& identity);
   void read_index();
 
   std::string folder_, set_aside_;

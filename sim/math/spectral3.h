@@ -50,18 +50,6 @@ void eigen_sym3_packed(const V* a, V* eigenvalues, V (*q)[3]) {
   for (int i = 0; i < 3; ++i) eigenvalues[i] = m[i];
 }
 
-/// As cholesky_one_plus.
-template <class V>
-void cholesky_one_plus_packed(const V* y, V* l) {
-  l[0] = lane_sqrt(y[0] + 1.0);
-  const V r0 = 1.0 / l[0];
-  l[3] = y[3] * r0;
-  l[4] = y[4] * r0;
-  l[1] = lane_sqrt(y[1] + 1.0 - l[3] * l[3]);
-  l[5] = (y[5] - l[4] * l[3]) / l[1];
-  l[2] = lane_sqrt(y[2] + 1.0 - l[4] * l[4] - l[5] * l[5]);
-}
-
 /// (ln a − ln b)/(a − b) for a, b > 0, given also their logarithms.
 template <class V>
 V log_difference(const V& a, const V& b, const V& log_a, const V& log_b) {

@@ -47,17 +47,22 @@ void inverse_one_plus(const T* y, T* inverse) {
   inverse[5] = (y[3] * y[4] - a * y[5]) * r;
 }
 
-/// Lower Cholesky factor of I + Y: l = {l00, l11, l22, l10, l20, l21}. NaN when not positive definite.
-template <class T>
-void cholesky_one_plus(const T* y, T* l) {
-  using std::sqrt;
-  l[0] = sqrt(y[0] + 1.0);
+/// Lower Cholesky factor of I + Y: l = {l00, l11, l22, l10, l20, l21}. NaN when not positive definite. `root`
+/// is the square root of a T, for packs of numbers that have no sqrt().
+template <class T, class Root>
+void cholesky_one_plus(const T* y, T* l, const Root& root) {
+  l[0] = root(y[0] + 1.0);
   const T r0 = 1.0 / l[0];
   l[3] = y[3] * r0;
   l[4] = y[4] * r0;
-  l[1] = sqrt(y[1] + 1.0 - l[3] * l[3]);
+  l[1] = root(y[1] + 1.0 - l[3] * l[3]);
   l[5] = (y[5] - l[4] * l[3]) / l[1];
-  l[2] = sqrt(y[2] + 1.0 - l[4] * l[4] - l[5] * l[5]);
+  l[2] = root(y[2] + 1.0 - l[4] * l[4] - l[5] * l[5]);
+}
+template <class T>
+void cholesky_one_plus(const T* y, T* l) {
+  using std::sqrt;
+  cholesky_one_plus(y, l, [](const T& a) { return T(sqrt(a)); });
 }
 
 /// Inverse of a lower triangular factor, same storage.

@@ -1,4 +1,5 @@
-#include <cstring>
+#include <algorithm>
+#include <numeric>
 #include <string>
 #include <unordered_map>
 
@@ -35,6 +36,14 @@ void join_coincident_vertices(TriangleSurface& surface) {
   int joined = 0;
   for (int vertex = 0; vertex < static_cast<int>(first.size()); ++vertex) joined += first[vertex] != vertex;
   if (joined == 0) return;
+  // Lists of vertices may name any of those at a place.
+  int num_sources = 0;
+  for (int vertex = 0; vertex < static_cast<int>(first.size()); ++vertex)
+    num_sources = std::max(num_sources, surface.source_of_vertex(vertex) + 1);
+  surface.joined_to.resize(num_sources);
+  std::iota(surface.joined_to.begin(), surface.joined_to.end(), 0);
+  for (int vertex = 0; vertex < static_cast<int>(first.size()); ++vertex)
+    surface.joined_to[surface.source_of_vertex(vertex)] = surface.source_of_vertex(first[vertex]);
   for (auto& face : surface.faces)
     for (int& vertex : face) vertex = first[vertex];
   surface.notes.push_back(std::to_string(joined) +

@@ -191,7 +191,7 @@ TriangleSurface crop_vertices(const TriangleSurface& surface, const std::vector<
                               const std::string& list_origin) {
   const int count = static_cast<int>(surface.vertices.rows());
   std::unordered_map<int, int> index_of;
-  int last = -1;
+  int last = static_cast<int>(surface.joined_to.size()) - 1;
   for (int vertex = 0; vertex < count; ++vertex) {
     index_of[surface.source_of_vertex(vertex)] = vertex;
     last = std::max(last, surface.source_of_vertex(vertex));
@@ -201,7 +201,7 @@ TriangleSurface crop_vertices(const TriangleSurface& surface, const std::vector<
     if (index < 0 || index > last)
       throw InputError(list_origin, "vertex " + std::to_string(index),
                        "vertices of " + surface.origin + " counted from 0, up to " + std::to_string(last));
-    const auto found = index_of.find(index);
+    const auto found = index_of.find(surface.standing_for(index));
     if (found != index_of.end()) listed[found->second] = 1;  // else used by no face
   }
   return keep_faces(surface, faces_with(surface, [&](int vertex) { return listed[vertex] != 0; }),

@@ -1,9 +1,10 @@
-// Words and numbers of text mesh files. Internal to sim/mesh.
+// Words of text mesh files. Internal to sim/mesh.
 #pragma once
 
 #include <algorithm>
-#include <charconv>
 #include <string_view>
+
+#include "sim/core/parse_number.h"
 
 namespace rhytid {
 
@@ -18,14 +19,6 @@ inline std::string_view next_word(std::string_view& rest) {
   const std::string_view word = rest.substr(begin, end - begin);
   rest.remove_prefix(end);
   return word;
-}
-
-/// Whether all of `word` is a number. Locale-free, unlike strtod and streams.
-template <typename Number>
-bool parse(std::string_view word, Number& value) {
-  if (word.size() > 1 && word[0] == '+') word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size();
 }
 
 }  // namespace rhytid

@@ -15,6 +15,9 @@ struct TriangleSurface {
   std::vector<std::array<int, 3>> faces;  ///< counter-clockwise seen from outside
   /// Index in the file, from 0, of each vertex (identity when nothing was left out).
   std::vector<int> source_vertex;
+  /// By index in the file, from 0: the vertex of the file that stands for it since coincident ones were
+  /// joined, itself where nothing was joined (empty = identity).
+  std::vector<int> joined_to;
   std::string origin;            ///< file name or generator, for messages
   std::vector<int> source_face;  ///< polygon in the file of each face, from 0 (empty = identity)
 
@@ -38,6 +41,11 @@ struct TriangleSurface {
   }
   /// Index in the file, from 0.
   int source_of_vertex(int vertex) const { return source_vertex.empty() ? vertex : source_vertex[vertex]; }
+  /// Index in the file of the vertex that stands for `source`, an index in the file.
+  int standing_for(int source) const {
+    const bool is_joined = source >= 0 && source < static_cast<int>(joined_to.size());
+    return is_joined ? joined_to[source] : source;
+  }
   int source_of_face(int face) const { return source_face.empty() ? face : source_face[face]; }
 };
 

@@ -1,11 +1,14 @@
 #include "sim/output/atomic_file.h"
 
+#include <dirent.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -24,10 +27,51 @@ std::string folder_of(const std::string& path) {
   return slash == 0 ? "/" : path.substr(0, slash);
 }
 
+constexpr std::string_view kMark = ".tmp-";
+
 /// Part of a temporary name that no other writer uses at the same time.
 std::string unique_mark() {
   static std::atomic<unsigned> counter = 0;
-  return ".tmp-" + std::to_string(getpid()) + "-" + std::to_string(counter++);
+  return std::string(kMark) + std::to_string(getpid()) + "-" + std::to_string(counter++);
+}
+
+/// The process that chose a unique_mark, 0 when `text` is none.
+pid_t process_of_mark(std::string_view text) {
+  if (!text.starts_with(kMark)) return 0;
+  text.remove_prefix(kMark.size());
+  const char* const end = text.data() + text.size();
+  pid_t process = 0;
+  unsigned count = 0;
+  const auto [dash, error] = std::from_chars(text.data(), end, process);
+  if (error != std::errc() || dash == end || *dash != '-') return 0;
+  const auto [stop, count_error] = std::from_chars(dash + 1, end, count);
+  return count_error == std::errc() && stop == end && process > 0 ? process : 0;
+}
+
+/// Removes what writers of before + ending left behind when they were killed: regular files of this user,
+/// named before + mark + ending, whose process is gone. A process is looked for on this machine only: two
+/// machines (or containers) that write the same file of a shared folder at the same time may take away each
+/// other's work.
+void remove_stale(const std::string& before, const std::string& ending) {
+  const std::string folder = folder_of(before);
+  const auto slash = before.rfind('/');
+  const std::string_view stem =
+      slash == std::string::npos ? std::string_view(before) : std::string_view(before).substr(slash + 1);
+  DIR* const listing = opendir(folder.c_str());
+  if (!listing) return;  // whoever opens the new file says so
+  while (const dirent* entry = readdir(listing)) {
+    std::string_view name = entry->d_name;
+    if (!name.starts_with(stem) || !name.ends_with(ending) || name.size() < stem.size() + ending.size())
+      continue;
+    const pid_t process =
+        process_of_mark(name.substr(stem.size(), name.size() - stem.size() - ending.size()));
+    if (process == 0 || kill(process, 0) == 0 || errno != ESRCH) continue;
+    struct stat status {};
+    if (fstatat(dirfd(listing), entry->d_name, &status, AT_SYMLINK_NOFOLLOW) == 0 &&
+        S_ISREG(status.st_mode) && status.st_uid == geteuid())
+      unlinkat(dirfd(listing), entry->d_name, 0);
+  }
+  closedir(listing);
 }
 
 /// Opens a new file beside `path` under a name nobody else uses and returns the descriptor, −1 on failure.
@@ -65,6 +109,7 @@ void require_no_folder(const std::string& path) {
 
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
   require_no_folder(path_);
+  remove_stale(path_, "");
   descriptor_ = open_temporary(path_, temporary_);
   if (descriptor_ < 0) fail("cannot create the file");
 }
@@ -106,6 +151,7 @@ AtomicPath::AtomicPath(std::string target) : target_(std::move(target)) {
   const auto slash = target_.rfind('/'), dot = target_.rfind('.');
   const auto stem = slash == std::string::npos ? 0 : slash + 1;
   const auto end = dot == std::string::npos || dot <= stem ? target_.size() : dot;
+  remove_stale(target_.substr(0, end), target_.substr(end));
   temporary_ = target_.substr(0, end) + unique_mark() + target_.substr(end);
 }
 

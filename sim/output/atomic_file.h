@@ -1,5 +1,6 @@
 // Files that never appear half-written: everything goes to a temporary name in the same folder, is flushed
-// to the disk and only then renamed over the final path, which POSIX does atomically.
+// to the disk and only then renamed over the final path, which POSIX does atomically. What a killed process
+// left under a temporary name goes when the same file is written the next time.
 #pragma once
 
 #include <string>

@@ -1,13 +1,14 @@
 #include "sim/scene/vertex_values.h"
 
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
+#include "sim/core/parse_number.h"
 
 namespace rhytid {
 namespace {
@@ -19,9 +20,7 @@ constexpr int kMostVertices = 20'000'000;  // 160 MB; the largest scans have a t
 void set(std::vector<double>& values, const std::string& vertex_text, double value,
          const std::string& where) {
   int vertex = -1;
-  const char* end = vertex_text.data() + vertex_text.size();
-  const auto [stop, error] = std::from_chars(vertex_text.data(), end, vertex);
-  if (error != std::errc() || stop != end || vertex < 0 || vertex > kMostVertices)
+  if (!parse(vertex_text, vertex) || vertex < 0 || vertex > kMostVertices)
     throw InputError(where, "'" + vertex_text.substr(0, 40) + "'", "a vertex number from 0");
   if (!(value > 0) || !std::isfinite(value))
     throw InputError(where, std::to_string(value) + " at vertex " + vertex_text, "a number > 0");
@@ -32,37 +31,22 @@ void set(std::vector<double>& values, const std::string& vertex_text, double val
   values[static_cast<std::size_t>(vertex)] = value;
 }
 
-std::string trimmed(const std::string& s) {
-  const auto first = s.find_first_not_of(" \t\r"), last = s.find_last_not_of(" \t\r");
-  return first == std::string::npos ? "" : s.substr(first, last - first + 1);
-}
-
 std::vector<double> from_csv(const std::string& text, const std::string& path) {
   std::vector<double> values;
   std::istringstream in(text);
-  std::string line;
   bool has_header = false;
-  for (int count = 1; std::getline(in, line); ++count) {
-    line = trimmed(line);
-    if (line.empty() || line[0] == '#') continue;
-    const std::string where = path + ":" + std::to_string(count);
-    const auto comma = line.find(',');
-    if (comma == std::string::npos || line.find(',', comma + 1) != std::string::npos)
-      throw InputError(where, "'" + line.substr(0, 60) + "'", "two cells, vertex,value");
-    if (!has_header) {
-      if (trimmed(line.substr(0, comma)) != "vertex")
-        throw InputError(where, "'" + line.substr(0, 60) + "'", "a header that begins with vertex");
-      has_header = true;
-      continue;
+  for_csv_lines(in, path, [&](const CsvLine& line) {
+    const auto refuse = [&](const char* expected) {
+      throw InputError(line.place, "'" + line.text.substr(0, 60) + "'", expected);
+    };
+    if (line.cells.size() != 2) refuse("two cells, vertex,value");
+    if (has_header) {
+      set(values, line.cells[0], csv_number(line.cells[1], line.place, "a number > 0"), line.place);
+    } else if (line.cells[0] != "vertex") {
+      refuse("a header that begins with vertex");
     }
-    const std::string cell = trimmed(line.substr(comma + 1));
-    double value = 0;
-    const char* end = cell.data() + cell.size();
-    const auto [stop, error] = std::from_chars(cell.data(), end, value);
-    if (error != std::errc() || stop != end)
-      throw InputError(where, "'" + cell.substr(0, 40) + "'", "a number > 0");
-    set(values, trimmed(line.substr(0, comma)), value, where);
-  }
+    has_header = true;
+  });
   return values;
 }
 

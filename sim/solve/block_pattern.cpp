@@ -16,7 +16,8 @@ namespace {
 constexpr int kTryMetisFromBlocks = 40000;
 
 /// Fill-reducing, postordered sequence of the graph whose lower triangle is given by columns: place → vertex.
-std::vector<int> fill_reducing_order(int n, std::vector<int>& column_start, std::vector<int>& rows) {
+std::vector<int> fill_reducing_order(int n, const std::vector<int>& column_start,
+                                     const std::vector<int>& rows) {
   CholmodSession session;
   const SingleThreadScope single_thread;
   session->nmethods = n >= kTryMetisFromBlocks ? 2 : 1;
@@ -25,17 +26,8 @@ std::vector<int> fill_reducing_order(int n, std::vector<int>& column_start, std:
   session->postorder = 1;
   session->supernodal = CHOLMOD_SIMPLICIAL;  // only the order is wanted
 
-  cholmod_sparse graph{};
-  graph.nrow = graph.ncol = static_cast<std::size_t>(n);
-  graph.nzmax = rows.size();
-  graph.p = column_start.data();
-  graph.i = rows.data();
-  graph.stype = -1;
-  graph.itype = CHOLMOD_INT;
-  graph.xtype = CHOLMOD_PATTERN;
-  graph.dtype = CHOLMOD_DOUBLE;
-  graph.sorted = 1;
-  graph.packed = 1;
+  cholmod_sparse graph =
+      lower_pattern(static_cast<std::size_t>(n), rows.size(), column_start.data(), rows.data());
   const auto release = [&](cholmod_factor* factor) { cholmod_free_factor(&factor, &session); };
   const std::unique_ptr<cholmod_factor, decltype(release)> factor(cholmod_analyze(&graph, &session), release);
   throw_on_cholmod_error(*&session);

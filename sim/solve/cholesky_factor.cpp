@@ -34,16 +34,9 @@ CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
   session->supernodal = CHOLMOD_SUPERNODAL;
   session->quick_return_if_not_posdef = 1;
 
-  matrix.nrow = matrix.ncol = static_cast<std::size_t>(p.num_unknowns());
-  matrix.nzmax = p.num_entries();
-  matrix.p = const_cast<int*>(impl.scalar_column_start.data());
-  matrix.i = const_cast<int*>(impl.scalar_rows.data());
-  matrix.stype = -1;
-  matrix.itype = CHOLMOD_INT;
-  matrix.xtype = CHOLMOD_PATTERN;
-  matrix.dtype = CHOLMOD_DOUBLE;
-  matrix.sorted = 1;
-  matrix.packed = 1;
+  matrix =
+      lower_pattern(static_cast<std::size_t>(p.num_unknowns()), static_cast<std::size_t>(p.num_entries()),
+                    impl.scalar_column_start.data(), impl.scalar_rows.data());
   const SingleThreadScope single_thread;
   factor = cholmod_analyze(&matrix, &session);
   matrix.xtype = CHOLMOD_REAL;

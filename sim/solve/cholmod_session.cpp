@@ -24,6 +24,22 @@ SingleThreadScope::~SingleThreadScope() {
   if (blas_threads_ != 1) openblas_set_num_threads(blas_threads_);
 }
 
+cholmod_sparse lower_pattern(std::size_t size, std::size_t num_entries, const int* column_start,
+                             const int* rows) {
+  cholmod_sparse pattern{};
+  pattern.nrow = pattern.ncol = size;
+  pattern.nzmax = num_entries;
+  pattern.p = const_cast<int*>(column_start);
+  pattern.i = const_cast<int*>(rows);
+  pattern.stype = -1;
+  pattern.itype = CHOLMOD_INT;
+  pattern.xtype = CHOLMOD_PATTERN;
+  pattern.dtype = CHOLMOD_DOUBLE;
+  pattern.sorted = 1;
+  pattern.packed = 1;
+  return pattern;
+}
+
 void throw_on_cholmod_error(const cholmod_common& common) {
   if (common.status >= CHOLMOD_OK) return;
   if (common.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();

@@ -3,6 +3,8 @@
 
 #include <cholmod.h>
 
+#include <cstddef>
+
 namespace rhytid {
 
 /// Owns a cholmod_common: silent (no messages, no error handler), 32-bit indices. Not for use by two threads
@@ -38,6 +40,11 @@ class SingleThreadScope {
  private:
   int active_levels_, blas_threads_;
 };
+
+/// A view of the lower triangle of a symmetric pattern by columns, rows sorted: no values, owns nothing
+/// (CHOLMOD's fields are not const, but it only reads them).
+cholmod_sparse lower_pattern(std::size_t size, std::size_t num_entries, const int* column_start,
+                             const int* rows);
 
 /// Throws std::bad_alloc or std::length_error when CHOLMOD ran out of memory or of 32-bit indices, and
 /// std::runtime_error on any other failure of status < 0. Warnings (not positive definite) pass.

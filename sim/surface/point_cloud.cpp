@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "sim/core/error.h"
+#include "sim/core/parse_number.h"
 
 namespace rhytid {
 namespace {
@@ -30,14 +30,6 @@ std::vector<std::string_view> words_of(std::string_view line) {
     at = end;
   }
   return words;
-}
-
-// Locale-free, unlike strtod and streams.
-template <class Number>
-bool parse(std::string_view word, Number& value) {
-  if (word.size() > 1 && word[0] == '+') word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size();
 }
 
 std::string shown(std::string_view text) {

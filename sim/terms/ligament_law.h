@@ -45,13 +45,19 @@ void continued_exponential(const T& z, T& e, T& phi) {
   }
 }
 
-struct LigamentLaw {
+/// What both laws have in common: sizes, and no history to prepare or to update.
+struct LigamentLawBase {
   static constexpr int ne = 3, ns = 0, np = 0, ntheta = 3, nrest = 0;
   static constexpr const char* name = "ligaments";
 
   template <class T>
   void prepare(const T*, const T*, const T*, const double*, double, T*) const {}
 
+  template <class T>
+  void update(const T*, const T*, const T*, const double*, double, T*) const {}
+};
+
+struct LigamentLaw : LigamentLawBase {
   template <class T>
   T stress(const T* u, const T*, const T* theta, const double*, double, T* traction) const {
     using std::sqrt;
@@ -65,18 +71,9 @@ struct LigamentLaw {
     for (int i = 0; i < 3; ++i) traction[i] = f * u[i];
     return k * s * phi;
   }
-
-  template <class T>
-  void update(const T*, const T*, const T*, const double*, double, T*) const {}
 };
 
-struct FungLigamentLaw {
-  static constexpr int ne = 3, ns = 0, np = 0, ntheta = 3, nrest = 0;
-  static constexpr const char* name = "ligaments";
-
-  template <class T>
-  void prepare(const T*, const T*, const T*, const double*, double, T*) const {}
-
+struct FungLigamentLaw : LigamentLawBase {
   template <class T>
   T stress(const T* u, const T*, const T* theta, const double*, double, T* traction) const {
     const T &k = theta[0], &b = theta[2];
@@ -87,9 +84,6 @@ struct FungLigamentLaw {
     for (int i = 0; i < 3; ++i) traction[i] = f * u[i];
     return 0.5 * k * d2 * phi;
   }
-
-  template <class T>
-  void update(const T*, const T*, const T*, const double*, double, T*) const {}
 };
 
 }  // namespace RHYTID_ISA

@@ -30,12 +30,13 @@ struct PackedKernel {
 
     Pack(const Law& law, const ElementView& v, const double (*natural)[kMaxRows], const double* prepared_all,
          const double* shared_constants, int first) {
-      Lanes local[nz] = {};
+      // Numbers, not lanes: GCC 12 takes lanes that are set one number at a time for uninitialised.
+      double local_numbers[nz][kLanes] = {};
       for (int k = 0; k < kLanes; ++k) {
         const bool inside = first + k < v.num_points;
         const int q = inside ? first + k : v.num_points - 1;
         for (int a = 0; a < 3; ++a)
-          for (int r = 0; r < 3; ++r) local[3 * a + r][k] = natural[a][3 * q + r];
+          for (int r = 0; r < 3; ++r) local_numbers[3 * a + r][k] = natural[a][3 * q + r];
         for (int i = 0; i < 9; ++i) jacobian[i][k] = v.inverse_jacobian[9 * q + i];
         weight[k] = inside ? v.weight[q] : 0;
         for (int c = 0; c < np; ++c) prepared[c][k] = prepared_all[q * np + c];
@@ -49,6 +50,9 @@ struct PackedKernel {
       }
       if (v.theta_stride == 0)
         for (int c = 0; c < nc; ++c) constants[c] = broadcast<Lanes>(shared_constants[c]);
+      Lanes local[nz];
+      static_assert(sizeof local == sizeof local_numbers);
+      std::memcpy(local, local_numbers, sizeof local);
       Kin::to_point(local, jacobian, h);
       Kin::strain(h, y);
     }

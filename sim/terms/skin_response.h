@@ -115,7 +115,7 @@ V equilibrium_response(const V* y, const V* theta, double volume, V* sigma, V (*
 template <class V>
 V maxwell_response(const V* y, const V* prepared, const V& k, V* sigma, V (*tangent)[6]) {
   V l[6], m[6], difference[6], x[6];
-  cholesky_one_plus_packed(prepared, l);
+  cholesky_one_plus(prepared, l, [](const V& a) { return lane_sqrt(a); });
   invert_lower(l, m);
   for (int c = 0; c < 6; ++c) difference[c] = y[c] - prepared[c];
   congruence_lower(m, difference, x);

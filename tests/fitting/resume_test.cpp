@@ -127,13 +127,69 @@ TEST_F(Resume, AnotherFitsLogIsSetAside) {
 
   input_.scene.solver.relative_tolerance *= 0.5;
   input_.options.parameters[0].lower = 0.01;
-  EXPECT_THAT(fit("log").notes.at(0), HasSubstr("(other scene, parameters)"));
+  EXPECT_THAT(fit("log").notes.at(0),
+              testing::AllOf(HasSubstr("(other scene, parameters)"), testing::EndsWith("log.old2")));
+  EXPECT_EQ(files("log.old2", "run").size(), 3u);
   write_file((folder_ / "log" / "identity.json").string(), "{");
   EXPECT_THAT(fit("log").notes.at(0), HasSubstr("unknown format"));
   input_.anew = true;
   const Outcome anew = fit("log");
   EXPECT_EQ(anew.replayed, 0);
   EXPECT_THAT(anew.notes.at(0), HasSubstr("not wanted"));
+}
+
+TEST_F(Resume, ALogThatWasSetAsideIsTakenBackByItsFit) {
+  input_.options.max_evaluations = 2;
+  const Outcome first = fit("log");
+  const double pixel = input_.tracks.tracks[0].observations[2].pixel.x();
+  input_.tracks.tracks[0].observations[2].pixel.x() += 1e-9;
+  const Outcome other = fit("log");
+  EXPECT_EQ(other.fresh, 2);
+  input_.tracks.tracks[0].observations[2].pixel.x() = pixel;
+  const Outcome back = fit("log");
+  EXPECT_EQ(back.replayed, 2);
+  EXPECT_EQ(back.fresh, 0);
+  EXPECT_EQ(back.record, first.record);
+  EXPECT_THAT(back.notes.at(0), testing::AllOf(HasSubstr("set aside in"), HasSubstr("taken back from"),
+                                               testing::EndsWith("log.old")));
+  EXPECT_FALSE(fs::exists(folder_ / "log.old")) << "it is the log again";
+  EXPECT_EQ(files("log.old2", "run").size(), 2u) << "the other fit's";
+  input_.anew = true;
+  EXPECT_EQ(fit("log").replayed, 0) << "what is not wanted is not taken back";
+}
+
+/// The path of a mesh says nothing: another content is another scene.
+TEST_F(Resume, AChangedMeshFileIsAnotherScene) {
+  const std::string mesh = (folder_ / "mesh.obj").string();
+  const auto write_mesh = [&](const char* corner) {
+    std::string text;
+    for (int j = 0; j <= 3; ++j)
+      for (int i = 0; i <= 4; ++i)
+        text += "v " + std::to_string(4 * i - 8) + " " + std::to_string(4 * j - 6) +
+                (i + j == 0 ? corner : " 0\n");
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 4; ++i) {
+        const int a = 1 + i + 5 * j;
+        text += "f " + std::to_string(a) + " " + std::to_string(a + 1) + " " + std::to_string(a + 6) + " " +
+                std::to_string(a + 5) + "\n";
+      }
+    write_file(mesh, text);
+  };
+  const auto identity = [&] {
+    nlohmann::json json = scene_to_json(test::drag_scene(1));
+    json["skin"]["surface"] = {{"file", mesh}, {"mm_per_unit", 1}};
+    input_.scene = parse_scene(json, "mesh.json");
+    const FitProblem problem(input_.scene, input_.options, input_.camera, input_.tracks);
+    return fit_identity(input_, problem);
+  };
+  write_mesh(" 0\n");
+  const FitIdentity before = identity(), same = identity();
+  EXPECT_EQ(same, before);
+  write_mesh(" 0.001\n");
+  const FitIdentity after = identity();
+  ASSERT_EQ(after.size(), before.size());
+  for (std::size_t k = 0; k < after.size(); ++k)
+    EXPECT_EQ(after[k] == before[k], after[k].first != "scene") << after[k].first;
 }
 
 TEST_F(Resume, PointWithoutDerivativeIsARefusedStep) {

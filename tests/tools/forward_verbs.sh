@@ -144,6 +144,15 @@ expect 0 any '^rhytid: warning: nothing to resume in run_f: the run starts from 
 expect 0 any '^rhytid: warning: /time/frames: 0, ' simulate tiny.json -o run_f "${small[@]}" --set /output/pictures=false --set /time/frames=null --set /name=null
 grep -q '^tiny: 0 frames' out.txt || fail "an unnamed scene has no name: $(cat out.txt)"
 
+# A run that settled under its pre-stretch and is resumed does not settle a second time.
+tense=(--set '/skin/pre_stretch={"stretch": 1.05}' --set /output/pictures=false)
+expect 0 any 'written to' simulate tiny.json -o run_f "${small[@]}" "${tense[@]}"
+expect 0 any 'written to' simulate tiny.json -o run_g "${small[@]}" "${tense[@]}" --set /time/frames=2
+expect 0 any 'resumed after frame 2' simulate tiny.json -o run_g "${small[@]}" "${tense[@]}" --resume
+for file in steps.csv state.bin frames/frame_0000.vtu frames/frame_0004.vtu; do
+  cmp -s run_f/$file run_g/$file || fail "$file differs after a settled run was resumed"
+done
+
 expect 0 any 'b from 1(\.[0-9]+)? to [34](\.[0-9]+)? 1/mm' heatmap tiny.json -o heat --weights --threads 1
 for file in heatmap.vtp heatmap.ply heatmap.csv heatmap.png weight_a.png weight_b.png; do
   [ -s heat/$file ] || fail "heatmap did not write $file"

@@ -2,30 +2,17 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <vector>
 
+#include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
 
 namespace rhytid::tools {
 
 namespace {
-
-std::string trimmed(const std::string& s) {
-  const auto first = s.find_first_not_of(" \t\r"), last = s.find_last_not_of(" \t\r");
-  return first == std::string::npos ? "" : s.substr(first, last - first + 1);
-}
-
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream in(line);
-  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(trimmed(cell));
-  if (!line.empty() && line.back() == ',') cells.emplace_back();
-  return cells;
-}
 
 /// What a column sets: −1 the time, 0..8 an entry of F, 9..11 a stretch.
 int column_meaning(const std::string& cell, const std::string& where) {
@@ -35,14 +22,6 @@ int column_meaning(const std::string& cell, const std::string& where) {
     return 3 * (cell[1] - '1') + cell[2] - '1';
   if (cell == "stretch1" || cell == "stretch2" || cell == "stretch3") return 9 + cell[7] - '1';
   throw InputError(where, "column '" + cell + "'", "time_s, F11 to F33, or stretch1 to stretch3");
-}
-
-double number(const std::string& cell, const std::string& where) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value))
-    throw InputError(where, "'" + cell + "'", "a finite number");
-  return value;
 }
 
 /// Columns of numbers, each row with the place it comes from.
@@ -56,23 +35,17 @@ struct HistoryTable {
 HistoryTable read_csv(const std::string& text, const std::string& name) {
   HistoryTable table;
   std::istringstream in(text);
-  std::string line;
-  for (int count = 1; std::getline(in, line); ++count) {
-    const std::string where = name + ":" + std::to_string(count);
-    if (trimmed(line).empty() || trimmed(line)[0] == '#') continue;
-    const std::vector<std::string> cells = cells_of(line);
+  for_csv_lines(in, name, [&](const CsvLine& line) {
     if (table.names.empty()) {
-      table.names = cells;
-      table.header_place = where;
-      continue;
+      table.names = line.cells;
+      table.header_place = line.place;
+      return;
     }
-    if (cells.size() != table.names.size())
-      throw InputError(where, std::to_string(cells.size()) + " cells",
-                       std::to_string(table.names.size()) + " as in the header");
-    table.places.push_back(where);
+    require_cells_as_in_header(line, table.names.size());
+    table.places.push_back(line.place);
     table.cells.emplace_back();
-    for (const std::string& cell : cells) table.cells.back().push_back(number(cell, where));
-  }
+    for (const std::string& cell : line.cells) table.cells.back().push_back(csv_number(cell, line.place));
+  });
   return table;
 }
 

@@ -4,13 +4,14 @@
 #include <cmath>
 
 namespace rhytid::rules {
-namespace {
 
 Quad square_root(Quad x) {
   Quad root = std::sqrt(static_cast<double>(x));
   for (int i = 0; i < 3; ++i) root = (root + x / root) / 2;
   return root;
 }
+
+namespace {
 
 // s = |z|² and t = Re z³ as polynomials of the barycentric coordinates, which avoids the √3 of Cartesian
 // ones: with e₁ = a + b + c = 1, e₂ = ab + bc + ca, e₃ = abc:  s = 1 − 3 e₂,  t = 1 − 9/2 e₂ + 27/2 e₃.

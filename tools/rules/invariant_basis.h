@@ -8,6 +8,9 @@
 
 namespace rhytid::rules {
 
+/// To the digits of Quad, x > 0.
+Quad square_root(Quad x);
+
 /// Values of φₖ and derivatives by the barycentric coordinates (a, b), c = 1 − a − b.
 template <typename T>
 struct InvariantValues {

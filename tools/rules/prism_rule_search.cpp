@@ -56,12 +56,6 @@ void even_legendre(T w, int count, const std::vector<Quad>& scales, std::vector<
   }
 }
 
-Quad square_root_of(int x) {
-  Quad root = std::sqrt(static_cast<double>(x));
-  for (int i = 0; i < 3; ++i) root = (root + x / root) / 2;
-  return root;
-}
-
 /// Residuals Σ wᵢ φₖ(xᵢ) L₂ₘ(zᵢ) − δ and their Jacobian; weights here sum to 1. Unknowns per orbit: weight,
 /// then its triangle coordinates, then z of a pair.
 template <typename T>
@@ -71,7 +65,7 @@ class PrismMoments {
       : basis_(basis), orbits_(orbits), heights_(degree / 2 + 1) {
     for (int k = 0; k < basis.size(); ++k)
       for (int m = 0; basis.degree_of(k) + 2 * m <= degree; ++m) products_.push_back({k, m});
-    for (int m = 0; m < heights_; ++m) scales_.push_back(square_root_of(4 * m + 1));
+    for (int m = 0; m < heights_; ++m) scales_.push_back(square_root(4 * m + 1));
     for (const Orbit& orbit : orbits) unknowns_ += orbit.unknowns();
   }
   int equations() const { return static_cast<int>(products_.size()); }

@@ -31,9 +31,10 @@ std::vector<std::array<int, 3>> refined_triangles(const SkinMesh& mesh) {
 /// Column of a vertex of the input surface, −1 when it was cropped away.
 int column_of_vertex(const SkinMesh& mesh, int vertex) {
   const auto& from = mesh.surface.source_vertex;
-  int local = vertex;
+  const int source = mesh.surface.standing_for(vertex);
+  int local = source;
   if (!from.empty()) {
-    const auto it = std::find(from.begin(), from.end(), vertex);
+    const auto it = std::find(from.begin(), from.end(), source);
     local = it == from.end() ? -1 : static_cast<int>(it - from.begin());
   }
   const bool exists = local >= 0 && local < static_cast<int>(mesh.vertex_columns.size());

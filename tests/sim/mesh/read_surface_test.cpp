@@ -2,8 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <random>
 
+#include "sim/scene/scene_surface.h"
 #include "tests/sim/mesh/mesh_files.h"
 #include "tests/sim/mesh/surface_testing.h"
 
@@ -120,6 +122,71 @@ TEST(ReadGlb, JoinsTheSeamsThatTexturesMake) {
   EXPECT_THAT(joined.notes.back(), HasSubstr("90 vertices joined"));
   for (int v = 0; v < joined.vertices.rows(); ++v)  // numbers are those of the file
     EXPECT_EQ(joined.vertices.row(v), cut.vertices.row(joined.source_vertex[v]));
+}
+
+TEST(ReadGlb, KeepsItsSeamsWhenTold) {
+  TriangleSurface cut = wavy_patch();
+  const MatrixX3 whole = cut.vertices;
+  cut.vertices.resize(3 * static_cast<int>(cut.faces.size()), 3);
+  for (int f = 0; f < static_cast<int>(cut.faces.size()); ++f)
+    for (int k = 0; k < 3; ++k) {
+      cut.vertices.row(3 * f + k) = whole.row(cut.faces[f][k]);
+      cut.faces[f][k] = 3 * f + k;
+    }
+  SurfaceScene scene;
+  scene.file = write_file("kept.glb", as_glb(cut));
+  scene.mm_per_unit = 1;
+  EXPECT_EQ(scene_surface(scene).vertices.rows(), whole.rows()) << "auto joins what the format doubles";
+  scene.coincident = "keep";
+  EXPECT_EQ(scene_surface(scene).vertices, cut.vertices);
+}
+
+/// Small files that claim to hold more than they do: refused at once, without room for what they claim.
+TEST(ReadSurface, RefusesSmallFilesThatClaimMuch) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto ply = [](const std::string& vertices, const std::string& faces, const std::string& rest) {
+    return "ply\nformat ascii 1.0\nelement vertex " + vertices +
+           "\nproperty float x\nproperty float y\nproperty float z\nelement face " + faces +
+           "\nproperty list uchar int vertex_indices\nend_header\n" + rest;
+  };
+  for (const char* count : {"2147483647", "4294967296", "1000000000000", "18446744073709551615", "-1"}) {
+    EXPECT_NE(refusal_of("ply", ply(count, "1", "0 0 0\n")), "") << count;
+    EXPECT_NE(refusal_of("ply", ply("1", count, "0 0 0\n3 0 0 0\n")), "") << count;
+    const std::string nodes = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n";
+    EXPECT_NE(refusal_of("msh", nodes + count + "\n1 0 0 0\n$EndNodes\n"), "") << count;
+    EXPECT_NE(refusal_of("msh", nodes + "1\n1 0 0 0\n$EndNodes\n$Elements\n" + count + "\n1 2 0 1 1 1\n"), "")
+        << count;
+    EXPECT_NE(refusal_of("msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 " + std::string(count) +
+                                    " 1 1\n2 1 0 " + count + "\n1\n0 0 0\n$EndNodes\n"),
+              "")
+        << count;
+    EXPECT_NE(refusal_of("obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 " + std::string(count) + "9\n"), "")
+        << count;
+  }
+  for (const long long count : {-1LL, 1LL << 31, 1LL << 40, 1LL << 62}) {
+    for (const char* what : {"count", "byteOffset"}) {
+      nlohmann::json root = {
+          {"asset", {{"version", "2.0"}}},
+          {"scenes", {{{"nodes", {0}}}}},
+          {"nodes", {{{"mesh", 0}}}},
+          {"buffers", {{{"byteLength", 36}}}},
+          {"bufferViews", {{{"buffer", 0}, {"byteLength", 36}}}},
+          {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}}}},
+          {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}}}};
+      root["accessors"][0][what] = count;
+      EXPECT_NE(refusal_of("glb", glb_container(root, std::string(36, '\0'))), "") << what << " " << count;
+      root["accessors"][0] = {{"componentType", 5126}, {"count", count}, {"type", "VEC3"}};
+      EXPECT_NE(refusal_of("glb", glb_container(root, std::string(36, '\0'))), "") << "no view, " << count;
+    }
+  }
+  // A node that is its own child, and a chain that is too deep to follow on the stack.
+  nlohmann::json loop = {
+      {"asset", {{"version", "2.0"}}}, {"scenes", {{{"nodes", {0}}}}}, {"nodes", {{{"children", {0}}}}}};
+  EXPECT_NE(refusal_of("glb", glb_container(loop, "")), "");
+  loop["nodes"] = nlohmann::json::array();
+  for (int k = 1; k <= 200000; ++k) loop["nodes"].push_back({{"children", {k % 200000}}});
+  EXPECT_NE(refusal_of("glb", glb_container(loop, "")), "");
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));
 }
 
 TEST(ReadSurface, RefusesWithALineThatHelps) {

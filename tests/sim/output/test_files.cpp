@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <bit>
 #include <charconv>
@@ -54,6 +56,48 @@ TEST(AtomicFile, LeavesNothingWithoutCommit) {
     EXPECT_FALSE(std::filesystem::exists(folder / "a.txt"));
   }
   EXPECT_EQ(folder.num_files(), 0u);
+}
+
+/// A process id that no process has: that of a child which has ended and is waited for.
+pid_t dead_process() {
+  const pid_t child = fork();
+  if (child == 0) _exit(0);
+  waitpid(child, nullptr, 0);
+  return child;
+}
+
+TEST(AtomicFile, RemovesWhatAKilledWriterLeft) {
+  const TemporaryFolder folder;
+  const auto leave = [&](const std::string& name) {
+    std::ofstream(folder / name) << "left";
+    return folder / name;
+  };
+  const auto exists = [](const std::string& path) { return std::filesystem::exists(path); };
+  const std::string dead = std::to_string(dead_process()), own = std::to_string(getpid());
+  const std::string stale = leave("a.txt.tmp-" + dead + "-0"), more = leave("a.txt.tmp-" + dead + "-12");
+  const std::string film = leave("film.tmp-" + dead + "-3.avi");
+  const std::vector<std::string> others = {leave("a.txt.tmp-" + own + "-999"),
+                                           leave("b.txt.tmp-" + dead + "-0"),
+                                           leave("a.txt.tmp-" + dead),
+                                           leave("a.txt.tmp-" + dead + "-0x"),
+                                           leave("a.txt.tmp-x-0"),
+                                           leave("a.txt.tmp--1-0"),
+                                           leave("my a.txt.tmp-" + dead + "-0"),
+                                           leave("film.tmp-" + dead + "-3.mp4")};
+  std::filesystem::create_symlink(others[0], folder / ("a.txt.tmp-" + dead + "-5"));
+  std::filesystem::create_directory(folder / ("a.txt.tmp-" + dead + "-6"));
+
+  write_file(folder / "a.txt", "new");
+  EXPECT_FALSE(exists(stale) || exists(more));
+  EXPECT_TRUE(exists(film));
+  {
+    const AtomicPath path(folder / "film.avi");
+    EXPECT_FALSE(exists(film));
+  }
+  for (const std::string& other : others) EXPECT_TRUE(exists(other)) << other;
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / ("a.txt.tmp-" + dead + "-5")));
+  EXPECT_TRUE(exists(folder / ("a.txt.tmp-" + dead + "-6")));
+  EXPECT_EQ(read_file(folder / "a.txt"), "new");
 }
 
 TEST(AtomicPath, KeepsTheExtensionAndAppearsOnCommit) {

@@ -6,6 +6,7 @@
 
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
+#include "sim/scene/scene_model.h"
 #include "sim/scene/scene_surface.h"
 
 namespace rhytid {
@@ -107,6 +108,39 @@ TEST(SceneSurface, RefusesAnOpenSeamUnlessTold) {
               AllOf(HasSubstr("2 vertices lie exactly on another one"), HasSubstr("vertex 11 on vertex 4")));
   EXPECT_EQ(surface_of(R"({"file": ")" + seam + R"(", "coincident": "join"})").vertices.rows(), 10);
   EXPECT_EQ(surface_of(R"({"file": ")" + seam + R"(", "coincident": "keep"})").vertices.rows(), 12);
+}
+
+TEST(SceneSurface, ListsMayNameEitherOfTwoJoinedVertices) {
+  const std::string seam =
+      write("joined.obj", grid_obj(2, 50) + "v 100 0 0\nv 100 50 0\nv 150 0 0\nf 11 13 12\n");
+  const std::string joined = R"({"file": ")" + seam + R"(", "coincident": "join")";
+  // From 0, vertex 10 lies on 3 and 11 on 6.
+  const auto crop = [&](const char* list) {
+    return surface_of(joined + R"(, "crop": {"vertices": )" + list + "}}");
+  };
+  EXPECT_EQ(crop("[10, 12, 11]").source_vertex, (std::vector<int>{3, 6, 12}));
+  EXPECT_EQ(crop("[10, 12, 11]").faces, crop("[3, 12, 6]").faces);
+  EXPECT_EQ(crop("[2, 5, 3, 11]").source_vertex, crop("[2, 5, 3, 6]").source_vertex);
+  // The last vertex of the file is a joined one and in the list all the same.
+  const std::string last =
+      write("last.obj", grid_obj(2, 50) + "v 150 0 0\nv 100 0 0\nv 100 50 0\nf 12 11 13\n");
+  EXPECT_EQ(
+      surface_of(R"({"file": ")" + last + R"(", "coincident": "join", "crop": {"vertices": [10, 11, 12]}})")
+          .faces.size(),
+      1u);
+
+  const auto map = [&](int vertex) {
+    const SceneModel model(
+        parse_scene_text(R"({"skin": {"order": 1, "surface": )" + joined +
+                             R"(}, "layers": [{"name": "soft", "thickness": 1, "youngs_modulus": 0.02}]},
+            "ligaments": {"diffusion_time": 900, "sources": [{"name": "b", "strength": 5, "vertex": 7}, {"name": "a", "strength": 1, "vertex": )" +
+                             std::to_string(vertex) + "}]}}",
+                         "a.json"));
+    return model.ligament_map(model.scene());
+  };
+  const VectorXd expected = map(3);
+  EXPECT_EQ(map(10), expected);
+  EXPECT_NE(map(1), expected);
 }
 
 }  // namespace

@@ -88,6 +88,14 @@ TEST_F(SkinFiles, ThicknessPerVertexIsLinearBetweenVertices) {
             scene.skin.layers[0].thickness_by_vertex);
 }
 
+TEST_F(SkinFiles, DefaultSmoothingIsThatOfThePatch) {
+  // A thickness far from the patch is in the file, and no part of this skin.
+  const std::string file = write("t.csv", table([](const Vec3&) { return 1.5; }) + "999,500\n");
+  const SceneModel m(drag({"/skin/layers/soft/thickness=null", "/skin/layers/soft/thickness_map=" + file,
+                           "/ligaments/smoothing=null"}));
+  EXPECT_NEAR(m.native()[m.model().native_block("ligaments").offset + 1], 0.01 * (1.5 + 0.15), 1e-12);
+}
+
 TEST_F(SkinFiles, ListsObjectsAndTablesAreTheSame) {
   const auto csv = read_vertex_values(write("a.csv", "vertex,thickness_mm\n2,0.5\n0,1\n"), "x");
   const auto list = read_vertex_values(write("a.json", "[1, null, 0.5]"), "x");
