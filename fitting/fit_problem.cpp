@@ -250,6 +250,8 @@ std::optional<MatrixXd> FitProblem::derivative(EvaluationLog::Kind kind,
       record->values = sweep();
     } catch (const adjoint::GradientError& error) {
       record->failure = error.what();
+    } catch (const InputError& error) {  // at a bound that takes a part of the model away
+      record->failure = error.what();
     }
     record->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (log != nullptr) log->add(kind, t_, *record);

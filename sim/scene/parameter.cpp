@@ -35,7 +35,7 @@ const Kind kinds[] = {
      [](Scene& s, size_t i) { return &s.skin.layers[i].poissons_ratio; }},
     {"/skin/layers/*/stiffening", 0.25, 100, log,
      [](Scene& s, size_t i) { return &s.skin.layers[i].stiffening; }},
-    {"/skin/layers/*/relaxing_fraction", 0, 0.999, logit,
+    {"/skin/layers/*/relaxing_fraction", 1e-3, 0.999, logit,
      [](Scene& s, size_t i) {
        double& fraction = s.skin.layers[i].relaxing_fraction;
        return fraction > 0 && s.time.damper != DamperScheme::none ? &fraction : nullptr;

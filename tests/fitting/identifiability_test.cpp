@@ -255,7 +255,7 @@ TEST(SpatialMisfit, IsASumOverPairsThatNeverTurnsNegative) {
   // Far apart, tracks count each for itself.
   const std::vector<Vec2> far = {Vec2(0, 0), Vec2(100, 0), Vec2(0, 100), Vec2(100, 100)};
   const MatrixXd four = scores.leftCols(4), sum = four * four.transpose();
-  EXPECT_LT((spatial_score_covariance(four, far) - 16. / 15 * sum).norm(), 1e-13 * sum.norm());
+  EXPECT_LT((spatial_score_covariance(four, far) - 9. / 8 * sum).norm(), 1e-13 * sum.norm());
   EXPECT_EQ(spatial_score_covariance(four, std::vector<Vec2>(4, Vec2(1, 1))).norm(), 0);
 }
 
