@@ -243,8 +243,7 @@ void Certification::without_effect() {
   } else {
     check.sentence = text(
         "%d parameters whose derivative is zero change the functional when they change by 0.01 %%: a part of "
-        "the "
-        "derivative is missing",
+        "the derivative is missing",
         space.size());
   }
   add(check);

@@ -216,12 +216,11 @@ void add_notes(const FitProblem& problem, const FitInput& input, const FitEvalua
 }
 
 /// Where the common misfit of neighbours decides the interval, and by how much.
-std::string which_are_wider(const Identifiability& by_noise, const Identifiability& found,
-                            const std::vector<FitVariable>& variables) {
+std::string which_are_wider(const Identifiability& found, const std::vector<FitVariable>& variables) {
   std::string list;
   for (int k = 0; k < static_cast<int>(variables.size()); ++k) {
-    const double ratio = found.sigma(k) / by_noise.sigma(k);
-    if (ratio > 1.0001) list += (list.empty() ? "" : ", ") + variables[k].name + number(" %.2f times", ratio);
+    const double ratio = found.widened_by_misfit(k);
+    if (ratio > 1) list += (list.empty() ? "" : ", ") + variables[k].name + number(" %.2f times", ratio);
   }
   return list.empty() ? "nowhere here" : "here " + list;
 }
@@ -301,15 +300,14 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
     result.right_vectors = found.right_vectors();
     result.correlation = found.correlation();
     for (std::string& sentence : found.cannot_tell()) result.cannot_tell.push_back(std::move(sentence));
-    result.notes.push_back(
-        "95 % intervals: Student's t on " + std::to_string(problem.degrees_of_freedom()) +
-        " degrees of freedom, standard deviations widened by " + number("%.3f", noise.widening) +
-        " (reduced chi-square " + number("%.3f", noise.reduced_chi_square) +
-        ", lag-1 autocorrelation of whitened residuals within tracks " +
-        number("%.3f", noise.autocorrelation) +
-        "), or what neighbouring tracks err alike where that is more (" +
-        which_are_wider(Identifiability(linearised->jacobian, variables, noise.widening), found, variables) +
-        ").");
+    result.notes.push_back("95 % intervals: Student's t on " + std::to_string(problem.degrees_of_freedom()) +
+                           " degrees of freedom, standard deviations widened by " +
+                           number("%.3f", noise.widening) + " (reduced chi-square " +
+                           number("%.3f", noise.reduced_chi_square) +
+                           ", lag-1 autocorrelation of whitened residuals within tracks " +
+                           number("%.3f", noise.autocorrelation) +
+                           "), or what neighbouring tracks err alike where that is more (" +
+                           which_are_wider(found, variables) + ").");
   } else {
     add_parameters(problem, t, nullptr, 0, truth, result);
     result.notes.push_back("No intervals: the run at the last values could not be differentiated.");

@@ -71,7 +71,7 @@ Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<Fit
   misfit_ = v.transpose() * misfit * v;
 }
 
-double Identifiability::sigma(const VectorXd& g) const {
+std::pair<double, double> Identifiability::deviations(const VectorXd& g) const {
   const VectorXd part = right_vectors_.transpose() * scale_.cwiseProduct(g);
   VectorXd by_noise = VectorXd::Zero(part.size()), by_misfit = by_noise;
   for (int i = 0; i < part.size(); ++i) {
@@ -79,12 +79,22 @@ double Identifiability::sigma(const VectorXd& g) const {
       by_noise[i] = part[i] / singular_values_[i];
       by_misfit[i] = by_noise[i] / singular_values_[i];
     } else if (std::fabs(part[i]) > 1e-6 * scale_.cwiseProduct(g).norm()) {
-      return kInfinity;
+      return {kInfinity, kInfinity};
     }
   }
   const double noise = widening_ * by_noise.norm();
-  if (misfit_.size() == 0) return noise;
-  return std::max(noise, std::sqrt(std::max(0.0, by_misfit.dot(misfit_ * by_misfit))));
+  if (misfit_.size() == 0) return {noise, 0};
+  return {noise, std::sqrt(std::max(0.0, by_misfit.dot(misfit_ * by_misfit)))};
+}
+
+double Identifiability::sigma(const VectorXd& g) const {
+  const auto [noise, misfit] = deviations(g);
+  return std::max(noise, misfit);
+}
+
+double Identifiability::widened_by_misfit(int parameter) const {
+  const auto [noise, misfit] = deviations(VectorXd::Unit(scale_.size(), parameter));
+  return misfit > noise ? misfit / noise : 1;
 }
 
 double Identifiability::sigma(int parameter) const {

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fitting/parametrisation.h"
@@ -33,6 +34,8 @@ class Identifiability {
   /// Standard deviation of gᵀt (g by t); infinite when g has a part in the null space.
   double sigma(const VectorXd& g) const;
   double sigma(int parameter) const;
+  /// How many times wider the misfit makes a parameter's interval than the noise: 1 where the noise decides.
+  double widened_by_misfit(int parameter) const;
   /// Of the scaled parameters; pairs with an undetermined member are NaN (1 on the diagonal).
   MatrixXd correlation() const;
   /// False when the standard deviation exceeds a factor e (log, logit) or a quarter of the range (plain).
@@ -42,6 +45,8 @@ class Identifiability {
 
  private:
   std::string direction_in_words(int i) const;
+  /// Standard deviations of gᵀt from the noise and from the misfit; both infinite in the null space.
+  std::pair<double, double> deviations(const VectorXd& g) const;
 
   std::vector<FitVariable> variables_;
   VectorXd scale_, singular_values_;

@@ -27,8 +27,9 @@ inline constexpr int kMisfitPatches = 3;
 /// Degrees of freedom of an interval that rests on them.
 inline constexpr int kMisfitDegrees = kMisfitPatches * kMisfitPatches - 1;
 
-/// B above, by t. `scores` [parameters][tracks], `pixels` of the tracks in frame 0. Zero when all tracks
-/// stand on one point. Throws ContractError when the numbers of tracks differ.
+/// B above, by t. `scores` [parameters][tracks], `pixels` of the tracks in frame 0. Zero, that is no
+/// statement, when all tracks stand on one row or column of the picture. Throws ContractError when the
+/// numbers of tracks differ.
 MatrixXd spatial_score_covariance(const MatrixXd& scores, const std::vector<Vec2>& pixels);
 
 }  // namespace rhytid::fitting

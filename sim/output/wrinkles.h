@@ -52,8 +52,8 @@ struct WrinkleDescriptors {
   double amplitude = 0;   ///< mm
   double wavelength = 0;  ///< mm
   double extent = 0;      ///< mm along a line, mm² on a grid
-  double direction =
-      0;  ///< of the wave vector against the first axis, rad in (−π/2, π/2]; crests run across it
+  /// Of the wave vector against the first axis, rad in (−π/2, π/2]; crests run across it.
+  double direction = 0;
   double coherence = 0;  ///< 0: waves in all directions, 1: in one
 };
 /// All zero for a surface without wrinkles.
@@ -61,10 +61,10 @@ WrinkleDescriptors describe(const WrinkleSums& sums);
 
 /// Counts along a line. They jump where descriptors do not.
 struct WrinkleCount {
-  int crests =
-      0;  ///< maxima that rise from both sides by at least `prominence` × (largest − smallest height)
-  int sign_changes =
-      0;  ///< of heights beyond 2 % of the largest |height|: one for every half wave but the first
+  /// Maxima that rise from both sides by at least `prominence` × (largest − smallest height).
+  int crests = 0;
+  /// Of heights beyond 2 % of the largest |height|: one for every half wave but the first.
+  int sign_changes = 0;
   double crest_spacing = 0;  ///< mean distance between neighbouring crests, mm; 0 with fewer than two
   double largest = 0;        ///< half of largest − smallest height, mm
 };

@@ -50,6 +50,17 @@ TEST(Identifiability, AgreesWithTheInverseNormalMatrix) {
   EXPECT_NEAR(found.correlation()(0, 2), covariance(0, 2) / std::sqrt(covariance(0, 0) * covariance(2, 2)),
               1e-12);
   EXPECT_TRUE(found.cannot_tell().empty());
+  // The sandwich by hand, where it is more and where it is less than the noise.
+  const MatrixXd scores = random_matrix(3, 20, 1), b = scores * scores.transpose();
+  const MatrixXd sandwich = covariance * b * covariance;
+  for (const double size : {1e3, 1e-3}) {
+    const Identifiability both(j, variables({"a", "b", "c"}), 1.5, size * size * b);
+    for (int k = 0; k < 3; ++k) {
+      const double noise = found.sigma(k), misfit = size * std::sqrt(sandwich(k, k));
+      EXPECT_NEAR(both.sigma(k), std::max(noise, misfit), 1e-10 * std::max(noise, misfit));
+      EXPECT_NEAR(both.widened_by_misfit(k), std::max(1.0, misfit / noise), 1e-9 * both.widened_by_misfit(k));
+    }
+  }
 }
 
 TEST(Identifiability, NamesAnExactTradeOffAndKeepsTheRatio) {

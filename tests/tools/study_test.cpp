@@ -48,8 +48,9 @@ TEST(BundledExperiments, CanBeBuiltAtTheQuickSizeAndReadAtTheFullOne) {
         if (size == StudySize::full || (needs_head && head_settings().empty())) continue;
         const SceneModel built(scene);
         if (&v != &e.variants.front()) continue;
-        if (e.measure.line)
+        if (e.measure.line) {
           EXPECT_EQ(SurfaceSamples(built.model().mesh, *e.measure.line, e.measure.line_points).missing(), 0);
+        }
         if (e.measure.window) {
           const SurfaceSamples window(built.model().mesh, *e.measure.window, 1);
           EXPECT_LT(window.missing(), 0.2 * window.rows() * window.columns());
