@@ -2,13 +2,13 @@
 // and doubtful settings are named.
 #include <gmock/gmock.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "sim/scene/load.h"
 #include "tests/support/paths.h"
+#include "tests/support/real_data.h"
 #include "tests/support/small_scenes.h"
 #include "tools/model_size.h"
 #include "tools/scene_review.h"
@@ -62,10 +62,7 @@ TEST(BundledScenes, rest_in_equilibrium) {
 }
 
 TEST(BundledScenes, head_rests_in_equilibrium) {
-  const char* folder = std::getenv("RHYTID_REALDATA");
-  if (!folder) GTEST_SKIP() << "RHYTID_REALDATA is not set: no real head to read";
-  const std::string head = std::string(folder) + "/heads/ict_facekit/generic_neutral_mesh.obj";
-  if (!std::filesystem::exists(head)) GTEST_SKIP() << head << " does not exist";
+  RHYTID_REAL_FILE_OR_SKIP(head, kHeadFile);
   for (const std::string name : {"head_forehead", "head_fit", "head_forehead_drag", "head_temple_drag"}) {
     const SceneModel scene_model(
         load_scene(source_dir() + "/data/scenes/" + name + "/scene.json", {"/skin/surface/file=" + head}));

@@ -12,7 +12,7 @@
 
 #include "fitting/tracking/tracker.h"
 #include "footage_folder.h"
-#include "real_footage.h"
+#include "tests/support/real_data.h"
 
 namespace rhytid::fitting {
 namespace {

@@ -3,11 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <numbers>
 
 #include "tests/sim/mesh/surface_testing.h"
+#include "tests/support/real_data.h"
 
 namespace rhytid {
 namespace {
@@ -15,10 +14,8 @@ namespace {
 class Head : public testing::Test {
  protected:
   void SetUp() override {
-    const char* folder = std::getenv("RHYTID_REALDATA");
-    if (!folder) GTEST_SKIP() << "RHYTID_REALDATA is not set: no real head to read";
-    path_ = std::string(folder) + "/heads/ict_facekit/generic_neutral_mesh.obj";
-    if (!std::filesystem::exists(path_)) GTEST_SKIP() << path_ << " does not exist";
+    RHYTID_REAL_FILE_OR_SKIP(path, kHeadFile);
+    path_ = path;
     head_ = read_obj(path_, 10);
   }
 
