@@ -191,7 +191,7 @@ Scene scene_of_fit(const Case& c, const LocatedJson& written) {
 }  // namespace
 
 Case load_case(const std::string& path, const std::vector<std::string>& settings) {
-  LocatedJson written = read_with_extends(path, case_rule_tree());
+  LocatedJson written = read_with_extends(path, case_rule_tree(), "case");
   refuse_scene(written, path, settings);
   for (const std::string& assignment : settings) apply_override(written, assignment, path, case_rule_tree());
   const LocatedJson located = resolve_against_rules(written, case_rule_tree());

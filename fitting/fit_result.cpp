@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -323,6 +324,11 @@ void write_fit_result(const FitResult& result, const std::string& folder) {
 
 FitResult read_fit_result(const std::string& folder) {
   const std::string path = folder + "/fit.json";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    throw InputError(folder,
+                     std::filesystem::is_directory(folder, error) ? "no fit.json in it" : "no folder there",
+                     "the folder with the results of a fit (`rhytid fit CASE -o FOLDER`)");
   Json json;
   try {
     json = Json::parse(read_file(path));

@@ -32,7 +32,7 @@ bool is_of_scenes(const std::string& setting) {
 
 Scene load_scene_argument(const std::string& file, const std::vector<std::string>& settings,
                           Progress& progress) {
-  LocatedJson written = read_with_extends(file, case_rules());
+  LocatedJson written = read_with_extends(file, case_rules(), "scene or case");
   if (!written.json.contains("scene") || written.json.contains("skin")) return load_scene(file, settings);
 
   std::vector<std::string> of_scene;

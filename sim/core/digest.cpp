@@ -9,14 +9,14 @@ namespace rhytid {
 
 std::string file_digest(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path, "cannot be opened", "a readable file");
+  if (!file) throw InputError(path, "a file that cannot be opened", "a readable one");
   Digest d;
   std::vector<char> block(1 << 20);
   while (file) {
     file.read(block.data(), static_cast<std::streamsize>(block.size()));
     d.bytes(block.data(), static_cast<std::size_t>(file.gcount()));
   }
-  if (file.bad()) throw InputError(path, "cannot be read to its end", "a readable file");
+  if (file.bad()) throw InputError(path, "a file that cannot be read to its end", "a readable one");
   return d.hex();
 }
 

@@ -3,13 +3,13 @@
 #include <filesystem>
 
 #include "sim/core/error.h"
+#include "sim/mesh/surface_builder.h"
 #include "sim/mesh/triangle_surface.h"
 
 namespace rhytid {
 
 TriangleSurface read_surface(const std::string& path, double mm_per_unit) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) throw InputError(path + ": cannot be opened");
+  require_mesh_file(path);
   std::string extension = std::filesystem::path(path).extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (extension == ".obj") return read_obj(path, mm_per_unit);

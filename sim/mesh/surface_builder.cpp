@@ -10,10 +10,21 @@
 
 namespace rhytid {
 
-std::string read_mesh_bytes(const std::string& path) {
+namespace {
+constexpr const char* kMeshFile = "a readable mesh file (.obj, .ply, .glb or .msh)";
+}
+
+void require_mesh_file(const std::string& path) {
   std::error_code error;
+  if (std::filesystem::is_regular_file(path, error)) return;
+  throw InputError(path, std::filesystem::exists(path, error) ? "what is no file" : "no file there",
+                   kMeshFile);
+}
+
+std::string read_mesh_bytes(const std::string& path) {
+  require_mesh_file(path);
   std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path, error)) throw InputError(path + ": cannot be opened");
+  if (!file) throw InputError(path, "a file that cannot be opened", kMeshFile);
   std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   if (file.bad()) throw InputError(path + ": reading failed");
   return bytes;

@@ -9,6 +9,9 @@
 
 namespace rhytid {
 
+/// Throws InputError unless there is a file at `path`.
+void require_mesh_file(const std::string& path);
+
 /// The whole file as bytes. Throws InputError when it cannot be read.
 std::string read_mesh_bytes(const std::string& path);
 

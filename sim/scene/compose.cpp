@@ -97,17 +97,17 @@ class Merger {
   const LocatedJson& patch_;
 };
 
-std::string read_text(const std::string& path, const std::string& mentioned_at) {
+std::string read_text(const std::string& path, const std::string& mentioned_at, const std::string& kind) {
   const std::string where = mentioned_at.empty() ? path : mentioned_at;
   std::error_code error;
-  if (fs::is_directory(path, error)) throw InputError(where, "the directory " + path, "a scene file");
+  if (fs::is_directory(path, error)) throw InputError(where, "the directory " + path, "a " + kind + " file");
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream text;
   if (stream) text << stream.rdbuf();
   if (!stream || stream.bad())
     throw InputError(
         where, fs::exists(path, error) ? path + ", which cannot be read" : path + ", which does not exist",
-        "a readable scene file");
+        "a readable " + kind + " file");
   return text.str();
 }
 
@@ -133,7 +133,7 @@ void resolve_paths(json& value, const RuleNode& node, const fs::path& folder) {
 }
 
 LocatedJson read_file(const std::string& path, const std::string& mentioned_at, const RuleNode& rules,
-                      std::vector<fs::path>& chain) {
+                      const std::string& kind, std::vector<fs::path>& chain) {
   std::error_code error;
   const fs::path identity = fs::weakly_canonical(path, error);
   for (const fs::path& earlier : chain)
@@ -141,7 +141,7 @@ LocatedJson read_file(const std::string& path, const std::string& mentioned_at, 
       throw InputError(mentioned_at, path + ", which extends this file again", "no cycle");
   chain.push_back(identity);
 
-  LocatedJson own = parse_located(read_text(path, mentioned_at), path);
+  LocatedJson own = parse_located(read_text(path, mentioned_at, kind), path);
   if (!own.json.is_object()) throw InputError(own.where(""), shown_json(own.json), "an object {...}");
   const fs::path folder = fs::path(path).parent_path();
   resolve_paths(own.json, rules, folder);
@@ -151,10 +151,10 @@ LocatedJson read_file(const std::string& path, const std::string& mentioned_at, 
     const json base = own.json["extends"];
     const std::string where = own.where("/extends") + ": /extends";
     if (!base.is_string() || base.get_ref<const std::string&>().empty())
-      throw InputError(where, shown_json(base), "the path of a scene file");
+      throw InputError(where, shown_json(base), "the path of a " + kind + " file");
     own.json.erase("extends");
     forget(own, "/extends");
-    result = read_file(resolved(base.get<std::string>(), folder).string(), where, rules, chain);
+    result = read_file(resolved(base.get<std::string>(), folder).string(), where, rules, kind, chain);
   } else {
     result.json = json::object();
   }
@@ -196,9 +196,9 @@ void merge(LocatedJson& target, const LocatedJson& patch, const RuleNode& rules)
   Merger(target, patch).run(rules);
 }
 
-LocatedJson read_with_extends(const std::string& path, const RuleNode& rules) {
+LocatedJson read_with_extends(const std::string& path, const RuleNode& rules, const std::string& kind) {
   std::vector<fs::path> chain;
-  return read_file(path, "", rules, chain);
+  return read_file(path, "", rules, kind, chain);
 }
 
 void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file,

@@ -48,8 +48,10 @@ LocatedJson parse_located(std::string_view text, const std::string& file);
 void merge(LocatedJson& target, const LocatedJson& patch, const RuleNode& rules = scene_rule_tree());
 
 /// Reads a file, makes paths in it absolute, and merges it into the file that it extends, and so on.
-/// Throws InputError when a file cannot be read, is malformed or extends itself.
-LocatedJson read_with_extends(const std::string& path, const RuleNode& rules = scene_rule_tree());
+/// `kind` is what messages call such a file. Throws InputError when a file cannot be read, is malformed or
+/// extends itself.
+LocatedJson read_with_extends(const std::string& path, const RuleNode& rules = scene_rule_tree(),
+                              const std::string& kind = "scene");
 
 /// Applies "pointer=value": value is JSON or, failing that, a string ("4 MPa"); null removes the value. List
 /// items are addressed by number or by name; missing objects on the way are created. In a list of strings

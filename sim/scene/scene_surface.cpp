@@ -28,7 +28,7 @@ TriangleSurface cropped(TriangleSurface mesh, const SurfaceScene& s) {
 
 std::vector<int> read_vertex_list(const std::string& path) {
   std::ifstream file(path);
-  if (!file) throw InputError(path + ": cannot be opened");
+  if (!file) throw InputError(path, "a file that cannot be opened", "a readable list of vertex numbers");
   std::vector<int> indices;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {

@@ -41,7 +41,8 @@ class CloudReader {
  public:
   CloudReader(const std::string& path, double mm_per_unit)
       : path_(path), mm_per_unit_(mm_per_unit), file_(path, std::ios::binary) {
-    if (!file_) throw InputError(path_ + ": cannot be opened");
+    if (!file_)
+      throw InputError(path_, "a file that cannot be opened", "a cloud of points: .ply, .obj, .xyz or .txt");
   }
 
   PointCloud read() {

@@ -76,7 +76,15 @@ expect 2 1 '^rhytid: error: a/tracks.csv: got no file, and no footage a/footage.
 expect 2 1 '^rhytid: error: --parameters: .*/ligaments/sources/c/strength' \
   fit case.json -o a --parameters /ligaments/sources/c/strength
 expect 2 1 '^rhytid: error: track: got neither a case nor --video, expected one of the two' track
-expect 2 1 '^rhytid: error: a/fit.json: cannot open' report a
+expect 2 1 '^rhytid: error: nodir: got no folder there, expected the folder with the results of a fit' report nodir
+mkdir -p a
+expect 2 1 '^rhytid: error: a: got no fit.json in it, expected the folder with the results of a fit' report a
+for verb in render track fit; do
+  expect 2 1 '^rhytid: error: no.json: got no.json, which does not exist, expected a readable case file$' $verb no.json -o a
+done
+expect 2 1 'expected a readable experiment file$' study sweep no.json -o a
+expect 2 1 '^rhytid: error: .*no.obj: got no file there, expected a readable mesh file \(.obj, .ply, .glb or .msh\)$' \
+  check scene.json --set /skin/surface/grid=null --set /skin/surface/file=no.obj
 
 for verb in render track fit; do
   expect 2 1 '^rhytid: error: scene.json: got a scene, expected a case, .* data/scenes/demo/case.json\)$' $verb scene.json -o a

@@ -64,7 +64,7 @@ expect 0 0 '^  residual at rest +0 N, exactly an equilibrium$' check tiny.json
 expect 0 0 '^  pictures +about .* more: 2 of each of 5 frames' check tiny.json
 expect 0 0 '^ +"unknowns": 135,$' check tiny.json --json
 /usr/bin/env python3 -c 'import json; json.load(open("out.txt"))' || fail "check --json is not JSON"
-expect 2 1 '^rhytid: error: no_such.json: got no_such.json, which does not exist, expected a readable scene file$' check no_such.json
+expect 2 1 '^rhytid: error: no_such.json: got no_such.json, which does not exist, expected a readable scene or case file$' check no_such.json
 expect 2 1 '^rhytid: error: tiny.json \(--set\): /skin/layers/soft/thicknes: got .*, nearest is "thickness"$' check tiny.json --set /skin/layers/soft/thicknes=1
 expect 2 1 'elastic_patch/scene.json: /ligaments: got nothing, expected ligaments with at least one source$' heatmap "$source/data/scenes/elastic_patch/scene.json"
 expect 2 1 '/skin/surface: got neither "file" nor "grid", expected one of the two, e.g. --set /skin/surface/file=PATH$' check "$source/data/scenes/head_forehead/scene.json"

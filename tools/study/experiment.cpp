@@ -196,7 +196,7 @@ variant, of the variant at the size, of the command line. `rhytid schema` descri
 }
 
 Experiment load_experiment(const std::string& path, StudySize size) {
-  const LocatedJson written = read_with_extends(path, rule_tree());
+  const LocatedJson written = read_with_extends(path, rule_tree(), "experiment");
   const LocatedJson located = resolve_against_rules(written, rule_tree());
   check(located);
   const json& root = located.json;

@@ -196,7 +196,9 @@ TEST(ReadSurface, RefusesWithALineThatHelps) {
   EXPECT_THAT(refusal_of("ply", as_obj(patch)), HasSubstr("is it a PLY file"));
   EXPECT_THAT(refusal_of("glb", as_obj(patch)), HasSubstr("is it a binary glTF file"));
   EXPECT_THAT(refusal_of("msh", as_obj(patch)), HasSubstr("is it a Gmsh"));
-  EXPECT_THAT(input_error([] { (void)read_surface("/no/such.ply", 1); }), HasSubstr("cannot be opened"));
+  EXPECT_THAT(input_error([] { (void)read_surface("/no/such.ply", 1); }),
+              AllOf(HasSubstr("got no file there"), HasSubstr(".obj, .ply, .glb or .msh")));
+  EXPECT_THAT(input_error([] { (void)read_surface("/", 1); }), HasSubstr("got what is no file"));
   EXPECT_THAT(refusal_of("msh", "$MeshFormat\n2.2 1 8\n"), HasSubstr("binary"));
   EXPECT_THAT(refusal_of("msh", "$MeshFormat\n4 0 8\n"), AllOf(HasSubstr(":2:"), HasSubstr("2.2 or 4.1")));
   EXPECT_THAT(
