@@ -9,6 +9,7 @@
 #include "sim/scene/located_json.h"
 #include "sim/scene/names.h"
 #include "sim/scene/read_path.h"
+#include "sim/scene/skin_rule.h"
 #include "sim/scene/validate.h"
 #include "sim/scene/vertex_values.h"
 
@@ -170,6 +171,26 @@ void check_motion(const ColliderScene& collider, const std::string& file) {
   }
 }
 
+/// Refuses rules that leave an element deformations without energy.
+void check_quadrature(const SkinScene& skin, const LocatedJson& resolved) {
+  for (const SkinRuleCheck& check : check_skin_rules(skin)) {
+    if (!check.sees_too_little()) continue;
+    std::string at = "/skin/quadrature";
+    if (skin.rule == RuleKind::sheet)
+      at += "/rule";
+    else if (skin.prism_degree > 0)
+      at += "/prism_degree";
+    const std::string element =
+        (check.layer.empty() ? "the composite element" : "an element of layer " + check.layer) +
+        " (p = " + std::to_string(skin.order) + ", q = " + std::to_string(check.order) + ")";
+    throw InputError(resolved.where(at) + ": " + at,
+                     std::to_string(check.points) + " points, so " + std::to_string(6 * check.points) +
+                         " strains, for the " + std::to_string(check.ways) + " ways to deform of " + element +
+                         ", which leaves some without energy",
+                     "a lower order through the thickness, or the default product rule");
+  }
+}
+
 Scene to_scene(const LocatedJson& located, const std::string& file) {
   const LocatedJson resolved = resolve_against_rules(located);
   check_consistency(resolved);
@@ -177,6 +198,7 @@ Scene to_scene(const LocatedJson& located, const std::string& file) {
   Reader reader(resolved.json);
   fields(reader, scene);
   scene.file = file;
+  check_quadrature(scene.skin, resolved);
   read_vertex_files(scene, resolved);
   for (ColliderScene& collider : scene.colliders) {
     if (!collider.path_file.empty()) collider.path = read_path(collider.path_file);

@@ -179,7 +179,9 @@ std::vector<Rule> skin_rules() {
        .options = enum_words<RuleKind>(),
        .doc =
            "product: a triangle rule times Gauss points through each layer. sheet: the prism rules that the "
-           "publication uses for its sheets, of total degree 1 (2 points), 4, 5, 6 for p = 1, 2, 3, 4."},
+           "publication uses for its sheets, of total degree 1 (2 points), 4, 5, 6 for p = 1, 2, 3, 4. They "
+           "are meant for elements that are quadratic through the thickness (linear at p = 1); for higher "
+           "orders they are too weak, and refused where deformations would cost no energy."},
       {.pointer = "/skin/quadrature/triangle_degree",
        .type = integer,
        .fallback = skin.triangle_degree,
@@ -198,7 +200,7 @@ std::vector<Rule> skin_rules() {
        .min = 0,
        .max = 8,
        .doc = "Total degree of a prism rule for each layer in place of triangle_degree and thickness_points. "
-              "0 = the product rule."},
+              "0 = the product rule. Below 2q - 1 or 2p - 2 energies come out too low."},
       {.pointer = "/skin/quadrature/volume",
        .type = option,
        .fallback = to_string(skin.volume),

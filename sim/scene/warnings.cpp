@@ -5,6 +5,7 @@
 
 #include "sim/core/units.h"
 #include "sim/scene/load.h"
+#include "sim/scene/skin_rule.h"
 
 namespace rhytid {
 namespace {
@@ -62,6 +63,19 @@ void warn_of_wrinkling_stack(const SkinScene& skin, std::vector<std::string>& wa
                                 " through several layers delays wrinkling 3 to 9 times; take 3 or 4"));
 }
 
+/// Rules that the energy of in-plane strains is too much for: it comes out too low, near ν = ½ most.
+void warn_of_quadrature(const SkinScene& skin, std::vector<std::string>& warnings) {
+  for (const SkinRuleCheck& check : check_skin_rules(skin))
+    if (check.is_weak())
+      warnings.push_back(sentence(
+          "/skin/quadrature: exact to degree ", check.plane, " in the plane and ", check.thickness,
+          " through the thickness, where ",
+          check.layer.empty() ? "the composite element" : "layer " + check.layer, " of orders ", skin.order,
+          " and ", check.order, " needs ", check.plane_needed, " and ", check.thickness_needed,
+          ", so that its energy comes out too low; lower the order through the thickness or take the default "
+          "product rule"));
+}
+
 void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
                       std::vector<std::string>& warnings) {
   const std::string at = "/colliders/" + collider.name;
@@ -99,6 +113,7 @@ std::vector<std::string> scene_warnings(const Scene& scene) {
   std::vector<std::string> warnings;
   for (const LayerScene& layer : scene.skin.layers) warn_of_layer(layer, scene, warnings);
   warn_of_wrinkling_stack(scene.skin, warnings);
+  warn_of_quadrature(scene.skin, warnings);
   for (const ColliderScene& collider : scene.colliders) warn_of_collider(collider, scene.time, warnings);
   if (scene.time.frames == 0)
     warnings.push_back("/time/frames: 0, so that a run ends where it starts; give the number of frames");

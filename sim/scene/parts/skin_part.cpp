@@ -5,6 +5,7 @@
 
 #include "sim/core/error.h"
 #include "sim/scene/scene_surface.h"
+#include "sim/scene/skin_rule.h"
 #include "sim/scene/vertex_values.h"
 #include "sim/terms/geometry.h"
 #include "sim/terms/pre_stretch_law.h"
@@ -26,18 +27,6 @@ double bulk_modulus(const LayerScene& l) {
 /// Part of the shear modulus that relaxes in this scene.
 double relaxing_part(const Scene& scene, const LayerScene& l) {
   return scene.time.damper == DamperScheme::none ? 0 : l.relaxing_fraction;
-}
-
-/// The rule in one slab of an element layer of thickness order `order`. `fewer` Gauss points less through it.
-PrismRule slab_rule(const SkinScene& skin, int order, int fewer) {
-  if (skin.rule == RuleKind::sheet) {
-    constexpr int kDegrees[] = {1, 4, 5, 6};  // numerics-notes A.2
-    return prism_rule(kDegrees[skin.order - 1]);
-  }
-  if (skin.prism_degree > 0) return prism_rule(skin.prism_degree);
-  const int degree = skin.triangle_degree > 0 ? skin.triangle_degree : 2 * skin.order + 2;
-  const int points = skin.thickness_points > 0 ? skin.thickness_points : order + 1;
-  return tensor_rule(triangle_rule(std::min(12, degree)), std::max(1, points - fewer));
 }
 
 /// Adds the frame of the pre-stretch at every point: direction in the layer [3] and its normal [3], ∇w
@@ -120,8 +109,7 @@ void SkinPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
       for (const MaterialSlab& slab : model.mesh.element_layers[k].slabs) {
         const LayerScene& layer = skin.layers[slab.material];
         if ((relaxing_part(scene, layer) > 0) != viscous) continue;
-        TermGroup g =
-            prism_group(model.mesh, k, slab, slab_rule(skin, model.mesh.element_layers[k].order, 0));
+        TermGroup g = prism_group(model.mesh, k, slab, skin_rule(skin, model.mesh.element_layers[k].order));
         const int base = model.native_block("layer/" + layer.name).offset;
         const int of_layer = term.kernels().ntheta - (skin.pre_stretch ? 2 : 0);
         for (int s = 0; s < of_layer; ++s) g.theta.push_back(constant_slot(base + s));
@@ -139,7 +127,7 @@ void SkinPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
     for (int k = 0; k < static_cast<int>(model.mesh.element_layers.size()); ++k)
       for (const MaterialSlab& slab : model.mesh.element_layers[k].slabs) {
         TermGroup g =
-            prism_group(model.mesh, k, slab, slab_rule(skin, model.mesh.element_layers[k].order, 1));
+            prism_group(model.mesh, k, slab, skin_rule(skin, model.mesh.element_layers[k].order, 1));
         const int base = model.native_block("layer/" + skin.layers[slab.material].name).offset;
         g.theta.push_back(constant_slot(base + SkinTheta::bulk));
         term.add_group(std::move(g));
