@@ -8,6 +8,7 @@
 #include <ostream>
 
 #include "fitting/tracking/overlay.h"
+#include "sim/core/digest.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
@@ -38,17 +39,37 @@ std::string in(const std::string& folder, const char* name) {
   return (fs::path(folder) / name).string();
 }
 
+/// Of the masks of skin and finger as they are, so that changes of the scene that do not show leave tracks
+/// valid.
+std::string masks_digest(const TrackJob& job, const Scene& scene) {
+  Digest digest;
+  const auto add = [&digest](const cv::Mat& mask) {
+    for (int row = 0; row < mask.rows; ++row) digest.bytes(mask.ptr(row), static_cast<size_t>(mask.cols));
+  };
+  add(job.options.seeds.region_mask);
+  fitting::Frame frame;
+  for (frame.index = 0; job.options.mask && frame.index <= scene.time.frames; ++frame.index) {
+    frame.time_s = frame.index / scene.time.frame_rate;
+    add(job.options.mask(frame));
+  }
+  return digest.hex();
+}
+
 /// Seeds on the skin, finger masked, as the camera sees both at rest and in every frame.
-void use_camera(const fitting::Case& c, const fitting::Camera& camera, fitting::TrackerOptions& options) {
+void use_camera(const fitting::Case& c, TrackJob& job) {
+  const fitting::Camera camera = *job.camera;
+  fitting::TrackerOptions& options = job.options;
   options.camera = camera.name;
   const Scene scene = load_scene(c.scene, c.scene_settings);
   const MovingSurface patch = outer_surface(SceneModel(scene).model().mesh, "");
   options.seeds.region_mask = patch_mask(patch, camera, options.window_px / 2);
-  if (!c.track.mask_finger) return;
-  const Vec3 direction = finger_direction(patch.mean_normal(), camera);
-  options.mask = [scene, direction, camera](const fitting::Frame& frame) {
-    return finger_mask(scene, frame.time_s, direction, camera, finger_margin_px);
-  };
+  if (c.track.mask_finger) {
+    const Vec3 direction = finger_direction(patch.mean_normal(), camera);
+    options.mask = [scene, direction, camera](const fitting::Frame& frame) {
+      return finger_mask(scene, frame.time_s, direction, camera, finger_margin_px);
+    };
+  }
+  job.masks_digest = masks_digest(job, scene);
 }
 
 void print_error(const TrackingError& error, std::ostream& out) {
@@ -63,12 +84,31 @@ void print_error(const TrackingError& error, std::ostream& out) {
   out << text << '\n';
 }
 
+/// An empty digest is null: without a camera there is none.
+nlohmann::json digest_or_null(const std::string& digest) {
+  return digest.empty() ? nlohmann::json() : nlohmann::json(digest);
+}
+
 }  // namespace
+
+nlohmann::json track_settings(const TrackJob& job) {
+  const fitting::SeedOptions& seeds = job.options.seeds;
+  const cv::Rect& r = seeds.region;
+  return {{"camera", digest_or_null(job.camera_digest)},
+          {"masks of skin and finger", digest_or_null(job.masks_digest)},
+          {"model", job.options.model == fitting::WarpModel::translation ? "translation" : "affine"},
+          {"max_tracks", seeds.max_tracks},
+          {"min_distance", seeds.min_distance_px},
+          {"roi", r.empty() ? nlohmann::json() : nlohmann::json({r.x, r.y, r.width, r.height})},
+          {"last frame", job.footage.last}};
+}
 
 TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
                    Progress& progress) {
   TrackJob job;
-  job.footage.path = video.empty() ? fitting::footage_path(c, folder) : video;
+  const std::string of_case = fitting::footage_path(c, folder);
+  job.footage.path = video.empty() ? of_case : video;
+  job.is_other_video = job.footage.path != of_case;
   job.noise = c.fit;
   job.options.seeds.max_tracks = c.track.max_tracks;
   job.options.seeds.min_distance_px = c.track.min_distance;
@@ -82,7 +122,7 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
   // Rendered footage and its truth lie side by side; another video has nothing to do with that truth.
   const std::string motion = in(folder, "truth_motion.bin");
   std::error_code ignored;
-  const fs::path beside = fs::path(folder) / fs::path(fitting::footage_path(c, folder)).filename();
+  const fs::path beside = fs::path(folder) / fs::path(of_case).filename();
   if (fs::exists(motion, ignored) && fs::equivalent(job.footage.path, beside, ignored) &&
       is_truth_of(in(folder, "truth.json"), job.footage.path, ""))
     job.truth_motion = motion;
@@ -90,10 +130,12 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
   const std::string path = fitting::camera_path(c, folder);
   if (c.camera.empty() && !fs::exists(path)) {
     progress.warning("no camera: tracks are not limited to the skin and the finger is not masked");
-    return job;
+  } else {
+    job.camera = fitting::read_camera(path);
+    job.camera_digest = file_digest(path);
+    use_camera(c, job);
   }
-  job.camera = fitting::read_camera(path);
-  use_camera(c, *job.camera, job.options);
+  job.of_case = track_settings(job);
   return job;
 }
 
@@ -109,6 +151,9 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
         std::to_string(source.size().width) + " x " + std::to_string(source.size().height) + " px",
         "the size of the camera, " + std::to_string(camera->width) + " x " + std::to_string(camera->height) +
             " px");
+  // Taken before the footage is read: when it changes meanwhile, the tracks are known to be of something
+  // else.
+  const nlohmann::json footage = footage_record(job.footage.path);
   progress.stage("track", source.frames_asked());
   options.progress = [&progress](const fitting::FrameCounts&, int processed, int) {
     progress.step_done(processed);
@@ -119,8 +164,15 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
   if (result.report.end == fitting::TrackerEnd::source_ended_early)
     progress.warning(job.footage.path + " ended after " + std::to_string(result.report.frames_processed) +
                      " of " + std::to_string(result.report.frames_asked) + " frames");
-  fs::remove(in(folder, "track.json"));  // it speaks of the tracks that are replaced now
+  std::optional<TrackingError> error;
+  if (camera && !job.truth_motion.empty())
+    error = tracking_error(result.tracks, read_motion(job.truth_motion), *camera, job.noise);
+  const nlohmann::json settings = track_settings(job);
+  nlohmann::json record = track_record(result.report, error);
+  record.update(tracks_record(footage, settings, job.of_case, job.is_other_video || settings != job.of_case));
+  write_file(in(folder, "track.json"), unfinished_tracks_record().dump() + "\n");
   fitting::write_tracks(result.tracks, in(folder, "tracks.csv"));
+  write_file(in(folder, "track.json"), record.dump(2) + "\n");
 
   progress.stage("drawing the tracks over the footage", 0);
   fitting::FrameSource again(job.footage);
@@ -128,12 +180,6 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
       fitting::write_overlay(again, result.tracks, options.camera, in(folder, "overlay.mp4"));
   write_overlay_picture(overlay.path, 2 * overlay.frames / 3, in(folder, "overlay.png"));
 
-  std::optional<TrackingError> error;
-  if (camera && !job.truth_motion.empty())
-    error = tracking_error(result.tracks, read_motion(job.truth_motion), *camera, job.noise);
-  nlohmann::json record = track_record(result.report, error);
-  record["footage"] = footage_record(job.footage.path);
-  write_file(in(folder, "track.json"), record.dump(2) + "\n");
   out << in(folder, "tracks.csv") << ": " << fitting::summary(result.report) << '\n';
   if (error) print_error(*error, out);
   return ExitCode::ok;

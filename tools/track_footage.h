@@ -3,6 +3,7 @@
 #pragma once
 
 #include <iosfwd>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -20,7 +21,14 @@ struct TrackJob {
   std::optional<fitting::Camera> camera;  ///< none: no check of the picture's size, no truth
   fitting::FitCase noise;                 ///< how a fit would weigh the tracks
   std::string truth_motion;               ///< of the footage, when `render` made it; else empty
+  std::string camera_digest;              ///< of the camera's file; empty: none
+  std::string masks_digest;               ///< of what the scene masks in all frames; empty: nothing
+  nlohmann::json of_case;                 ///< track_settings as the case alone has them; null without one
+  bool is_other_video = false;            ///< not the case's footage
 };
+
+/// What decides the tracks beside the footage, by name; for tracks_record.
+nlohmann::json track_settings(const TrackJob& job);
 
 /// What a case says about its tracks: footage, seeds, the skin's silhouette, the finger's mask. `video` in
 /// place of the case's footage unless empty. The truth is that of the footage in `folder` which `render`
@@ -28,8 +36,9 @@ struct TrackJob {
 TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
                    Progress& progress);
 
-/// Tracks and writes tracks.csv, overlay.mp4 (or .avi), overlay.png and track.json into `folder`; a summary
-/// on `out`. ok or interrupted. `threads` is for OpenCV. Throws InputError.
+/// Tracks and writes tracks.csv, track.json, overlay.mp4 (or .avi) and overlay.png into `folder`; a summary
+/// on `out`. What track.json says is of the tracks beside it whenever the writing is cut off. ok or
+/// interrupted. `threads` is for OpenCV. Throws InputError.
 ExitCode track_footage(const TrackJob& job, const std::string& folder, int threads, Progress& progress,
                        std::ostream& out);
 

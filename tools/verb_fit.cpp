@@ -85,17 +85,14 @@ class Fit : public Verb {
     const Scene scene = load_scene(c.scene, c.scene_settings);
     const fitting::FitCase options = options_of(c, scene);
     const std::string tracks = fitting::tracks_path(c, folder), camera = fitting::camera_path(c, folder);
-    require_tracks_or_footage(c, tracks, folder);
-    for (const std::string& warning : scene_warnings(scene)) progress.warning(warning);
     const std::string footage = fitting::footage_path(c, folder);
-    const bool is_outdated = c.tracks.empty() && tracks_are_outdated(tracks, footage);
-    if (is_outdated) progress.note(footage + " has changed since " + tracks + " was made: tracking it again");
-    if (is_outdated || !fs::exists(tracks)) {
-      const ExitCode tracked = track_first(c, tracks, folder, context);
-      if (tracked != ExitCode::ok) return tracked;
-    }
+    require_tracks_or_footage(c, tracks, folder);
+    fitting::Camera seen_by = fitting::read_camera(camera);
+    const ExitCode tracked = current_tracks(c, tracks, folder, context);
+    if (tracked != ExitCode::ok) return tracked;
+    for (const std::string& warning : scene_warnings(scene)) progress.warning(warning);
     fitting::FitInput input{.scene = scene,
-                            .camera = fitting::read_camera(camera),
+                            .camera = std::move(seen_by),
                             .tracks = fitting::read_tracks(tracks),
                             .options = options,
                             .truth = {},
@@ -146,12 +143,29 @@ class Fit : public Verb {
                      "tracks, or footage (of a camera, or made by 'rhytid render')");
   }
 
-  /// The first stage of the main job, when nobody has done it yet.
-  static ExitCode track_first(const fitting::Case& c, const std::string& tracks, const std::string& folder,
-                              VerbContext& context) {
+  /// The first stage of the main job, when nobody has done it yet or the tracks in `folder` are not those
+  /// that the case asks for. Throws InputError rather than write over tracks that the command line had a say
+  /// in, or take tracks for others that cannot be made.
+  static ExitCode current_tracks(const fitting::Case& c, const std::string& tracks, const std::string& folder,
+                                 VerbContext& context) {
     const std::string footage = fitting::footage_path(c, folder);
-    context.progress.note("no tracks yet (" + tracks + "): tracking " + footage + " first");
+    const fs::path own = fs::path(folder) / "tracks.csv";
+    const bool is_there = fs::exists(tracks);
+    std::error_code ignored;
+    if (is_there && !(fs::equivalent(tracks, own, ignored) && fs::exists(own.parent_path() / "track.json")))
+      return ExitCode::ok;  // made elsewhere, or by something else
     const TrackJob job = track_job(c, folder, "", context.progress);
+    if (is_there) {
+      const auto outdated = outdated_tracks(tracks, footage, track_settings(job));
+      if (!outdated) return ExitCode::ok;
+      if (outdated->by_hand || !fs::exists(footage))
+        throw InputError(
+            tracks, "tracks " + outdated->why,
+            "those of the case (track again; without " + tracks + " and with footage, fit does)");
+      context.progress.note(tracks + " is " + outdated->why + ": tracking " + footage + " again");
+    } else {
+      context.progress.note("no tracks yet (" + tracks + "): tracking " + footage + " first");
+    }
     const ExitCode code = track_footage(job, folder, context.options.threads, context.progress, context.out);
     if (code == ExitCode::ok && !fs::exists(tracks))
       throw InputError(tracks, "no file", "the name tracks.csv, which tracking writes");

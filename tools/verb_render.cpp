@@ -62,15 +62,14 @@ class Render : public Verb {
 
     TwinRun twin = motion(context, truth, stride, in_folder("truth_motion.bin"));
     if (context.progress.interrupted()) return ExitCode::interrupted;
-    // From here on what the folder holds of an earlier truth is wrong; the new truth comes when its footage
-    // is there.
+    // From here on what the folder holds of an earlier truth is wrong. Footage and camera of before stay
+    // until the new footage is whole: an interrupted run leaves a pair that belongs together, or no camera.
     fs::remove(in_folder("truth.json"));
     fs::remove(in_folder("truth_tracks.csv"));
     write_motion(twin.surface, in_folder("truth_motion.bin"));
     const fitting::Camera camera =
         c.camera.empty() ? automatic_camera(twin.surface, c.render.width, c.render.height, c.render.tilt)
                          : fitting::read_camera(c.camera);
-    fitting::write_camera(camera, in_folder("camera.yaml"));
     if (!film(context, c, truth.scene(), twin.surface, camera, folder)) return ExitCode::interrupted;
     nlohmann::json record = truth_record(fit, truth, stride, twin.surface.frames());
     record["footage"].update(footage_record(footage_in(c, folder)));
@@ -122,7 +121,10 @@ class Render : public Verb {
       context.progress.step_done(frame + 1);
       if (context.progress.interrupted()) return false;
     }
+    const std::string camera_file = (fs::path(folder) / "camera.yaml").string();
+    fs::remove(camera_file);
     footage.commit();
+    fitting::write_camera(camera, camera_file);
     fitting::write_tracks(tracker.tracks(), (fs::path(folder) / "truth_tracks.csv").string());
     char text[160];
     std::snprintf(text, sizeof(text), "%d frames at %g Hz, %d x %d px, %.2f s a frame; %zu exact tracks",

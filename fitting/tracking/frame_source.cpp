@@ -184,6 +184,10 @@ FrameSource::FrameSource(FrameSourceOptions options)
 }
 
 FrameSource::~FrameSource() = default;
+std::vector<std::string> FrameSource::files() const {
+  return reader_->images.empty() ? std::vector<std::string>{options_.path} : reader_->images;
+}
+
 FrameSource::FrameSource(FrameSource&&) noexcept = default;
 FrameSource& FrameSource::operator=(FrameSource&&) noexcept = default;
 

@@ -51,6 +51,8 @@ class FrameSource {
   /// Smallest difference between two grey values of the files: 1 for 8 bit, 255/65535 for 16 bit.
   double quantum() const;
   const FrameSourceOptions& options() const { return options_; }
+  /// The stills in order, or the one video file.
+  std::vector<std::string> files() const;
 
  private:
   struct Reader;

@@ -108,6 +108,50 @@ grep -q '</html>' a/report.html || fail "report.html is not whole"
 chi=$(python3 -c 'import json; print(json.load(open("a/fit.json"))["reduced_chi_square"])')
 echo "reduced chi-square $chi"
 
+# Tracks are those of the footage and of what the case asks, or made again; never so over what was asked by hand.
+mkdir c && cp a/{camera.yaml,tracks.csv,track.json} c && cp a/footage.avi A.avi
+few() { expect 3 0 "$1" fit case.json -o c --max-evaluations 1 "${@:2}"; }
+few 'cost' --set /footage=A.avi
+grep -q tracking err.txt && fail "valid tracks were not taken: $(cat err.txt)"
+few 'c/tracks.csv is made with other max_tracks: tracking A.avi again' --set /footage=A.avi --set /track/max_tracks=10
+few 'is made with other max_tracks, roi:' --set /footage=A.avi --set '/track/roi=[0, 0, 159, 119]'
+few 'is made with other masks of skin and finger, roi:' --set /footage=A.avi --set /track/mask_finger=false
+few 'is made with other masks of skin and finger:' --set /footage=A.avi
+sed 's/^name:.*/name: "other"/' a/camera.yaml >c/camera.yaml
+few 'c/tracks.csv is made with other camera: tracking A.avi again' --set /footage=A.avi
+echo '{"unfinished": true}' >c/track.json
+few 'c/tracks.csv is not finished: tracking A.avi again' --set /footage=A.avi
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o c --set /footage=A.avi --model translation --max-tracks 12
+cp c/tracks.csv by_hand.csv
+few 'cost' --set /footage=A.avi
+few 'cost' --set /footage=a/footage.avi
+expect 2 1 '^rhytid: error: c/tracks.csv: got tracks made with other model, expected those of the case' \
+  fit case.json -o c --set /footage=A.avi --set /track/model=translation
+cmp c/tracks.csv by_hand.csv || fail "tracks made by hand were written over"
+rm c/track.json
+few 'cost' --set /footage=A.avi --set /track/model=translation
+grep -q tracking err.txt && fail "tracks without a record were not taken: $(cat err.txt)"
+# What track.json says is written as soon as the tracks are there.
+mkdir -p cut/overlay.mp4 cut/overlay.avi
+"$program" track case.json -o cut --video A.avi --threads 1 >out.txt 2>err.txt && fail "an overlay over a folder"
+grep -q '"by_hand": true' cut/track.json || fail "tracks without their record: $(cat cut/track.json err.txt)"
+# Stills have a digest too.
+mkdir stills && for i in 0 1 2; do cp a/frame_0000.png stills/f_$i.png; done
+expect 0 0 'tracks.csv: 3 of 3 frames' track -o still --video 'stills/f_%d.png'
+grep -q '"digest": "[0-9a-f]*"' still/track.json || fail "no digest of stills: $(cat still/track.json)"
+
+# A render that is interrupted leaves footage and camera of before.
+cp a/camera.yaml camera_before.yaml && mkdir r && cp a/{footage.avi,camera.yaml,truth.json,truth_motion.bin} r
+"$program" render case.json -o r --threads 1 --set '/render/tilt="35 deg"' --set /render/supersampling=8 >out.txt 2>err.txt &
+pid=$!
+for _ in $(seq 3000); do [ -e r/frame_0000.png ] && break; sleep 0.01; done
+kill -INT $pid
+wait $pid
+code=$?
+[ "$code" = 4 ] || fail "interrupted render: exit $code: $(cat err.txt)"
+cmp r/camera.yaml camera_before.yaml && cmp r/footage.avi a/footage.avi || fail "an interrupted render mixed footage and camera"
+[ ! -e r/truth.json ] || fail "truth beside footage that it may not belong to"
+
 # Killed in the middle, it goes on after the last completed run and ends at the same bits.
 mkdir b && cp a/{footage.avi,camera.yaml,truth.json,tracks.csv} b
 "$program" fit case.json -o b --threads 1 >out.txt 2>err.txt &
@@ -176,7 +220,7 @@ expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o a
 
 # Other footage under the same name: its tracks are made again, and compared with its own truth.
 expect 0 0 '^a/footage.avi: 5 frames' render case.json -o a --set '/truth/settings/0=/colliders/finger/friction/coefficient=0.3'
-expect 0 0 'a/footage.avi has changed since a/tracks.csv was made: tracking it again' fit case.json -o a
+expect 0 0 'a/tracks.csv is of other footage: tracking a/footage.avi again' fit case.json -o a
 grep -qE '^finger friction coefficient .* 0\.3 +[-+][0-9.]+ +(yes|no)$' out.txt || fail "not the new truth: $(cat out.txt)"
 python3 - <<'PYTHON' || fail "the fit did not see the new footage"
 import json
@@ -185,6 +229,14 @@ raise SystemExit(not 0.2 < value < 0.45)
 PYTHON
 cp a/footage.avi a/new.avi && cp other.avi a/footage.avi
 expect 0 0 'a/truth.json is the truth of other footage: not compared' fit case.json -o a
+
+# The same under another name.
+cp a/new.avi B.avi && rm -rf c/tracks.csv
+few 'no tracks yet' --set /footage=A.avi
+few 'c/tracks.csv is of other footage: tracking B.avi again' --set /footage=B.avi
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o c --video A.avi
+expect 2 1 '^rhytid: error: c/tracks.csv: got tracks of other footage, expected those of the case' \
+  fit case.json -o c --set /footage=B.avi
 
 # Stopped by the user: what an earlier fit found stays.
 cp a/fit.json before.json

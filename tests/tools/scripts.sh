@@ -89,7 +89,7 @@ cat >build/release/bin/rhytid <<'PROGRAM'
 # VERB case.json -o FOLDER
 mkdir -p "$4" && echo "$1" >>calls.txt
 case $1 in
-  render) touch "$4"/{truth.json,camera.yaml} && echo 1 >"$4/truth_tracks.csv" ;;
+  render) for file in camera.yaml truth_tracks.csv truth.json; do echo 1 >"$4/$file"; done ;;
   track) echo 1 >"$4/tracks.csv" && echo 1 >"$4/track.json" ;;
   fit) echo '"converged": true,' >"$4/fit.json"; echo "the answer" | tee "$4/answer.txt"; echo 1 >"$4/report.html" ;;
 esac
@@ -104,6 +104,10 @@ grep -q '^the answer$' out.txt || fail "a finished demo does not show its answer
 sed -i 's/true/false/' run/demo/fit.json && touch run/demo/answer.txt run/demo/report.html
 tools/demo >out.txt 2>&1
 [ "$(called)" = "fit " ] || fail "a fit that did not converge is left at that"
+# A render that was killed before its last file left the rest as new as it would be.
+sleep 0.02 && rm run/demo/truth.json && touch run/demo/truth_tracks.csv
+tools/demo >out.txt 2>&1
+[ "$(called)" = "render track fit " ] || fail "footage without its truth is taken for rendered"
 sleep 0.02 && touch data/scenes/demo/scene.json
 tools/demo >out.txt 2>&1
 [ "$(called)" = "render track fit " ] || fail "a changed scene does not start the demo over"
