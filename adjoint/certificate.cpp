@@ -20,6 +20,8 @@ struct Stopped {};
 
 // Of the largest slope: parameters below it are not scaled up further.
 constexpr double kSmallestShare = 1e-4;
+// Of the largest effect: below it a derivative is zero but for rounding, and no run could show it.
+constexpr double kRounding = 1e-12;
 
 std::string text(const char* format, auto... values) {
   char buffer[400];
@@ -69,6 +71,7 @@ class Certification {
   void choose_parameters();
   VectorXd random_direction(int size);
   void duality();
+  void measure_noise_once(const ParameterSpace& space, const VectorXd& direction);
   void taylor();
   void gauge();
   void without_effect();
@@ -88,7 +91,7 @@ class Certification {
   std::mt19937 rng_;
   std::string part_;
   int done_ = 0, total_ = 0;
-  bool stopped_ = false;
+  bool stopped_ = false, noise_known_ = false;
   CertificateReport report_;
   AdjointResult adjoint_;
   std::vector<std::string> addresses_;
@@ -101,16 +104,23 @@ VectorXd Certification::random_direction(int size) {
 }
 
 void Certification::choose_parameters() {
-  std::vector<std::string> wanted = options_.addresses;
-  if (wanted.empty())
-    for (const ParameterSpec& spec : all_parameters(scene_model_.scene())) wanted.push_back(spec.address);
+  std::vector<std::string> wanted = options_.addresses, all;
+  for (const ParameterSpec& spec : all_parameters(scene_model_.scene())) all.push_back(spec.address);
+  if (wanted.empty()) wanted = all;
+  // A modulus that only scales all forces has terms that cancel, but for rounding as in the gauge identity.
+  const auto terms = [this](const ParameterSpace& space) {
+    return space.jacobian().col(0).cwiseProduct(adjoint_.native_bar).eval();
+  };
+  double largest = 0;
+  for (const std::string& address : all)
+    largest = std::max(largest, terms(ParameterSpace(scene_model_, {address})).cwiseAbs().sum());
   for (const std::string& address : wanted) {
     const ParameterSpace one(scene_model_, {address});
     // What does not reach the functional has no slope to test.
-    if (one.jacobian().col(0).dot(adjoint_.native_bar) != 0)
-      addresses_.push_back(one.specs()[0].address);
-    else
-      report_.without_effect.push_back(one.specs()[0].address);
+    const VectorXd own = terms(one);
+    const double rounding = std::max(options_.largest_gauge * own.cwiseAbs().sum(), kRounding * largest);
+    const bool is_zero = std::fabs(own.sum()) <= rounding;
+    (is_zero ? report_.without_effect : addresses_).push_back(one.specs()[0].address);
   }
   const ParameterSpace space(scene_model_, addresses_);
   report_.parameters = space.specs();
@@ -157,6 +167,13 @@ void Certification::duality() {
             count)});
 }
 
+void Certification::measure_noise_once(const ParameterSpace& space, const VectorXd& direction) {
+  if (noise_known_) return;
+  report_.noise = measure_noise(*functional_, space, direction, [this] { return tick(); });
+  if (stopped_) throw Stopped{};
+  noise_known_ = true;
+}
+
 void Certification::taylor() {
   begin("rounding noise", 2 * static_cast<int>(run_.steps.size()));
   MinimiserOptions minimiser = certificate_minimiser({});
@@ -181,8 +198,6 @@ void Certification::taylor() {
   groups.insert(groups.end(), options_.groups.begin(), options_.groups.end());
   if (options_.each_parameter)
     for (const ParameterSpec& spec : report_.parameters) groups.push_back({spec.name, {spec.address}});
-  const auto go_on = [this] { return tick(); };
-  bool noise_known = false;
   for (const ParameterGroup& group : groups) {
     const ParameterSpace space(scene_model_, group.addresses);
     if (space.size() == 0) continue;
@@ -193,11 +208,7 @@ void Certification::taylor() {
     const double largest = gradient.cwiseAbs().maxCoeff();
     if (largest > 0)
       random = random.cwiseQuotient(gradient.cwiseAbs().cwiseMax(kSmallestShare * largest).eval());
-    if (!noise_known) {
-      report_.noise = measure_noise(*functional_, space, random, go_on);
-      if (stopped_) throw Stopped{};
-      noise_known = true;
-    }
+    measure_noise_once(space, random);
     for (const bool along_gradient : {false, true}) {
       if (along_gradient && space.size() == 1 && groups.size() > 1) continue;  // the same line again
       const std::string direction = along_gradient ? "gradient" : space.size() == 1 ? "alone" : "random";
@@ -207,7 +218,7 @@ void Certification::taylor() {
         series.sentence = "the gradient is zero: there is no direction to test along";
       } else {
         series = taylor_test(*functional_, space, along_gradient ? gradient : random, gradient, report_.noise,
-                             options_.taylor, go_on);
+                             options_.taylor, [this] { return tick(); });
       }
       if (stopped_) throw Stopped{};
       series.group = group.name;
@@ -225,10 +236,11 @@ void Certification::taylor() {
 /// a path of the derivative is missing.
 void Certification::without_effect() {
   if (report_.without_effect.empty()) return;
-  begin("parameters without effect", static_cast<int>(run_.steps.size()));
+  begin("parameters without effect", (noise_known_ ? 1 : 3) * static_cast<int>(run_.steps.size()));
   const ParameterSpace space(scene_model_, report_.without_effect);
   CertificateCheck check{"no effect", 0, 0, Verdict::fail, ""};
   const VectorXd small = VectorXd::Constant(space.size(), 1e-4);
+  measure_noise_once(space, small);  // where nothing has an effect
   const auto other = functional_->evaluate(space.native(small), {}, [this] { return tick(); });
   if (stopped_) throw Stopped{};
   check.figure = std::fabs(other.difference);
@@ -239,7 +251,9 @@ void Certification::without_effect() {
   } else if (check.figure <= check.threshold) {
     check.verdict = Verdict::pass;
     check.sentence = text(
-        "%d parameters whose derivative is zero, changed by 0.01 %% together, change nothing", space.size());
+        "%d parameters whose derivative is zero but for rounding, changed by 0.01 %% together, change "
+        "nothing",
+        space.size());
   } else {
     check.sentence = text(
         "%d parameters whose derivative is zero change the functional when they change by 0.01 %%: a part of "

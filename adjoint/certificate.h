@@ -73,7 +73,7 @@ struct CertificateReport {
   std::vector<TaylorSeries> taylor;
   std::vector<ParameterSpec> parameters;    ///< tested jointly
   std::vector<double> gradient;             ///< dQ/dx of those, x as in parameter_space.h
-  std::vector<std::string> without_effect;  ///< addresses left out
+  std::vector<std::string> without_effect;  ///< addresses left out: derivative zero but for rounding
   std::vector<RegimeCount> regimes;         ///< how much contact, stick and slip the run saw
   std::vector<double> step_times;           ///< s, end of each step
   SweepReport steps;                        ///< pivots and residuals per step

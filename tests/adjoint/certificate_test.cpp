@@ -243,6 +243,50 @@ TEST(Certificate, ParametersWithoutEffectAreNamed) {
   EXPECT_THROW((void)certify(c.scene_model, c.run, *c.output, c.weights, unknown), InputError);
 }
 
+/// A bar of one elastic layer, bent by its ends, under a ball that never touches it.
+CertifiedCase bar_case(const std::vector<std::string>& settings = {}) {
+  return CertifiedCase(R"({
+    "name": "bar",
+    "skin": {"surface": {"grid": {"size": [20, 4], "cells": [4, 1]}}, "order": 2, "rim": "free",
+      "layers": [{"name": "rubber", "thickness": 1, "order": 2, "youngs_modulus": "1 MPa", "poissons_ratio": 0.3,
+                  "relaxing_fraction": 0}],
+      "held": [{"name": "left", "box": {"low": [-10, -2, 0], "high": [-10, 2, 0]}},
+               {"name": "right", "box": {"low": [10, -2, 0], "high": [10, 2, 0]},
+                "path": [{"time": 0, "displacement": [0, 0, 0]}, {"time": 1, "displacement": [1, 0.5, 1.5]}]}]},
+    "colliders": [{"name": "ball", "shape": "sphere", "radius": 2, "path": [{"time": 0, "position": [0, 0, 90]}]}],
+    "time": {"frame_rate": 2, "frames": 2}
+  })",
+                       settings);
+}
+
+// Displacements that are given leave a single modulus without effect: its derivative is rounding, not zero.
+TEST(Certificate, ADerivativeThatIsRoundingIsNone) {
+  const CertifiedCase c = bar_case();
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  CertificateOptions thorough;
+  thorough.each_parameter = true;
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, thorough);
+  print(report);
+  EXPECT_TRUE(report.passed());
+  EXPECT_THAT(report.without_effect, testing::Contains("/skin/layers/rubber/youngs_modulus"));
+  EXPECT_EQ(report.parameters.size(), 2u);  // Poisson's ratio and stiffening
+  EXPECT_EQ(check(report, "no effect").verdict, Verdict::pass);
+}
+
+// With nothing to test there is no certificate; that no derivative is missing can be said all the same.
+TEST(Certificate, NothingWithAnEffectIsNoMissingDerivative) {
+  const CertifiedCase c = bar_case({"/skin/layers/rubber/relaxing_fraction=0.5", "/time/frames=4"});
+  CertificateOptions options;
+  options.addresses = {"/colliders/ball/radius", "/colliders/ball/stiffness"};
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  print(report);
+  EXPECT_EQ(report.without_effect, options.addresses);
+  EXPECT_GT(report.noise, 0);
+  for (const CertificateCheck& one : report.checks)
+    EXPECT_EQ(one.verdict == Verdict::fail, one.name == "Taylor slope") << one.name;
+  EXPECT_FALSE(report.passed());
+}
+
 TEST(Certificate, TextAndJsonAgree) {
   const CertifiedCase& c = small_case();
   CertificateOptions options;
