@@ -21,17 +21,6 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-template <class T>
-double megabytes(const std::vector<T>& values) {
-  return static_cast<double>(values.size() * sizeof(T)) / 1e6;
-}
-
-double group_megabytes(const TermGroup& g) {
-  return megabytes(g.nodes) + megabytes(g.node_by_row) + megabytes(g.rows_by_node) +
-         megabytes(g.inverse_jacobian) + megabytes(g.weight) + megabytes(g.rest) +
-         megabytes(g.field_columns) + megabytes(g.field_weights) + megabytes(g.cliques);
-}
-
 }  // namespace
 
 ModelSize model_size(const SceneModel& scene_model) {
@@ -97,7 +86,7 @@ MemoryEstimate memory_estimate(const SceneModel& scene_model, const ModelSize& s
   MemoryEstimate m;
   double prepared = 0;
   for (const Term& term : model.terms) {
-    for (const TermGroup& g : term.groups()) m.model += group_megabytes(g);
+    m.model += static_cast<double>(term.bytes()) / 1e6;
     prepared += static_cast<double>(term.num_points()) * term.kernels().np * sizeof(double) / 1e6;
   }
   // The pattern keeps, besides the row indices, where each clique's block pairs go.

@@ -7,6 +7,7 @@
 #include <ostream>
 
 #include "sim/core/units.h"
+#include "sim/scene/feature_work.h"
 #include "sim/scene/load.h"
 #include "sim/scene/parameter.h"
 #include "tools/frame_writer.h"
@@ -111,6 +112,20 @@ ordered_json to_json(const Findings& f) {
   j["features"] = ordered_json::array();
   for (const FeatureNote& n : f.scene_model.features())
     j["features"].push_back({{"feature", n.feature}, {"present", n.present}, {"detail", n.detail}});
+  j["work"] = ordered_json::array();
+  for (const FeatureWork& w : feature_work(f.scene_model))
+    j["work"].push_back({{"feature", w.feature},
+                         {"prepared", w.prepared},
+                         {"energies", w.energies},
+                         {"gradients", w.gradients},
+                         {"hessians", w.hessians},
+                         {"updates", w.updates},
+                         {"heat_maps", w.heat_maps},
+                         {"points", w.points},
+                         {"history", w.history},
+                         {"shapes", w.shapes},
+                         {"neighbours", w.neighbours},
+                         {"bytes", w.bytes}});
   j["rest"] = {{"residual_N", f.cost.rest_residual},
                {"positive_definite", f.cost.positive_definite},
                {"smallest_pivot", f.cost.smallest_pivot},
@@ -167,6 +182,24 @@ std::string term_text(const TermSize& t) {
   return t.history ? text + ", " + count_text(static_cast<double>(t.history)) + " numbers of history" : text;
 }
 
+/// "1 shape", "2 shapes".
+std::string counted(double n, const char* thing) {
+  return count_text(n) + " " + thing + (n == 1 ? "" : "s");
+}
+
+/// All numbers of a feature, zeros in words only when every one of them is zero.
+std::string work_text(const FeatureWork& w) {
+  if (w.is_nothing()) return "nothing: 0 evaluations, 0 points, 0 numbers of history, 0 bytes";
+  std::string text = std::to_string(w.evaluations()) + " evaluations of " +
+                     count_text(static_cast<double>(w.points)) + " points, " +
+                     count_text(static_cast<double>(w.history)) + " numbers of history, " +
+                     number_text(static_cast<double>(w.bytes) / 1e6) + " MB";
+  if (w.heat_maps > 0) text += "; " + counted(static_cast<double>(w.heat_maps), "heat map");
+  if (w.shapes > 0) text += "; " + counted(static_cast<double>(w.shapes), "rigid shape");
+  if (w.neighbours > 0) text += " with " + counted(static_cast<double>(w.neighbours), "listed neighbour");
+  return text;
+}
+
 void print(const Findings& f, std::ostream& out) {
   const Scene& scene = f.scene_model.scene();
   Lines lines(out);
@@ -206,6 +239,9 @@ void print(const Findings& f, std::ostream& out) {
                               " from a compression of " + number_text(100 * f.wrinkles->critical_strain) +
                               " % (half-space), " + number_text(f.wrinkles->nodes_per_wavelength()) +
                               " nodes per wavelength");
+
+  lines.heading("Work and memory by feature, in this check");
+  for (const FeatureWork& w : feature_work(f.scene_model)) lines.row(w.feature, work_text(w));
 
   lines.heading("Estimate");
   lines.row("memory",

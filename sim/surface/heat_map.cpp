@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "sim/core/error.h"
+#include "sim/core/work_count.h"
 #include "sim/surface/heat_operator.h"
 #include "sim/surface/m_matrix_factor.h"
 
@@ -47,6 +48,14 @@ Eigen::Index nearest_source(const Vec3& x, const std::vector<HeatSource>& source
 
 }  // namespace
 
+namespace {
+WorkCount maps_solved;
+}
+
+long heat_maps_solved() {
+  return maps_solved;
+}
+
 HeatMapWeights diffuse_sources(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
                                const std::vector<HeatSource>& sources, double time) {
   require(!sources.empty(), "diffuse_sources: at least one source is needed");
@@ -56,6 +65,7 @@ HeatMapWeights diffuse_sources(const MatrixX3& nodes, const std::vector<std::arr
     require(source.position.allFinite(), "diffuse_sources: source position must be finite");
     require(std::isfinite(source.radius) && source.radius > 0, "diffuse_sources: radius must be > 0");
   }
+  ++maps_solved;
   const HeatOperator op = assemble_heat_operator(nodes, triangles);
   HeatMapWeights result;
   const MatrixXd theta = source_kernels(nodes, op.mass, sources, &result.unresolved_sources);

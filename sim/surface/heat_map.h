@@ -41,4 +41,7 @@ struct HeatMapWeights {
 HeatMapWeights diffuse_sources(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
                                const std::vector<HeatSource>& sources, double time);
 
+/// Calls of diffuse_sources since the program began: work that only ligament sources cause.
+long heat_maps_solved();
+
 }  // namespace rhytid

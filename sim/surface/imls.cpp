@@ -192,6 +192,16 @@ ImlsSurface::ImlsSurface(const MatrixX3& points, const MatrixX3& normals, const 
 
 ImlsSurface::~ImlsSurface() = default;
 
+std::size_t ImlsSurface::num_neighbours() const {
+  return lattice_ ? lattice_->num_entries() : 0;
+}
+
+std::size_t ImlsSurface::bytes() const {
+  // The tree keeps its own copy of the points and an index of each.
+  const std::size_t tree = samples_.size() * (sizeof(Vec3) + sizeof(std::size_t));
+  return samples_.size() * sizeof(Sample) + tree + (lattice_ ? lattice_->bytes() : 0);
+}
+
 void ImlsSurface::search(const Vec3& x, double radius, std::vector<int>* found) const {
   tree_->within(x, radius * kSearchSlack, found);
   // The order of summation is part of the result: ascending index, however the points were found.

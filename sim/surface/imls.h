@@ -52,6 +52,10 @@ class ImlsSurface final : public ImplicitShape {
   /// True when x lies below the tangent plane of the nearest point.
   bool behind(const Vec3& x) const override;
 
+  std::size_t num_neighbours() const override;
+  /// Samples, tree (estimated) and neighbour lists.
+  std::size_t bytes() const override;
+
   double support() const { return support_; }
   int num_points() const { return static_cast<int>(samples_.size()); }
 

@@ -2,6 +2,8 @@
 // frame.
 #pragma once
 
+#include <cstddef>
+
 #include "sim/core/types.h"
 
 namespace rhytid {
@@ -26,6 +28,10 @@ class ImplicitShape {
   /// For a point where evaluate() has no support: is it on the body's side, i.e. hopelessly deep? (The
   /// contact law makes such a trial state infeasible instead of letting the skin fall through.)
   virtual bool behind(const Vec3&) const { return false; }
+  /// Entries of the neighbour lists that are kept for queries; 0 for a shape in closed form.
+  virtual std::size_t num_neighbours() const { return 0; }
+  /// Memory held besides the object itself, bytes; 0 for a shape in closed form.
+  virtual std::size_t bytes() const { return 0; }
 };
 
 }  // namespace rhytid

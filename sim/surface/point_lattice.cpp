@@ -3,13 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/core/work_count.h"
+
 namespace rhytid {
 
 namespace {
 constexpr int kBits = 20;  // per axis of a cell's key
+WorkCount lattices_made;
+}  // namespace
+
+long PointLattice::made() {
+  return lattices_made;
+}
+
+std::size_t PointLattice::bytes() const {
+  constexpr std::size_t kNode =
+      sizeof(void*);  // each entry of the table is a node with a pointer to the next
+  return points_.size() * sizeof(int) + runs_.size() * (sizeof(*runs_.begin()) + kNode) +
+         runs_.bucket_count() * sizeof(void*);
 }
 
 PointLattice::PointLattice(const MatrixX3& points, double radius) {
+  ++lattices_made;
   const Vec3 low = points.colwise().minCoeff(), high = points.colwise().maxCoeff();
   const double largest = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
   reach_ = radius + 1e-9 * (radius + largest);  // rounding of positions and of cell boundaries

@@ -27,6 +27,12 @@ class PointLattice {
   /// Ascending indices of a superset of the points within the radius of x; empty where there are none, also
   /// for an x that is not finite. Safe from several threads.
   std::span<const int> near(const Vec3& x) const;
+  /// Entries of all lists together.
+  std::size_t num_entries() const { return points_.size(); }
+  /// Memory of the lists and of the table of cells, bytes (the table's own overhead estimated).
+  std::size_t bytes() const;
+  /// Lattices made since the program began: work that only IMLS surfaces cause.
+  static long made();
 
  private:
   using Cell = std::array<std::int64_t, 3>;

@@ -37,6 +37,15 @@ void Term::add_group(TermGroup g) {
   groups_.push_back(std::move(g));
 }
 
+std::size_t Term::bytes() const {
+  const auto of = [](const auto& values) { return values.size() * sizeof(values[0]); };
+  std::size_t sum = 0;
+  for (const TermGroup& g : groups_)
+    sum += of(g.nodes) + of(g.node_by_row) + of(g.rows_by_node) + of(g.inverse_jacobian) + of(g.weight) +
+           of(g.rest) + of(g.field_columns) + of(g.field_weights) + of(g.cliques);
+  return sum;
+}
+
 std::vector<std::vector<double>> Term::map_theta(const StepInfo& step, const VectorXd& native,
                                                  double fixed_scale) const {
   const int nt = kernels_->ntheta;

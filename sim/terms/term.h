@@ -9,12 +9,12 @@
 // only way in and out.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "sim/core/types.h"
+#include "sim/core/work_count.h"
 #include "sim/terms/kernel_table.h"
 #include "sim/terms/path.h"
 
@@ -65,25 +65,10 @@ struct TermStepData {
   std::vector<std::vector<double>> theta;  ///< per group: one row, or [num_elements·num_points][ntheta]
 };
 
-/// A count that several threads may raise; reads as a number, copies as one.
-class WorkCount {
- public:
-  WorkCount() = default;
-  WorkCount(const WorkCount& other) : n_(other.n_.load(std::memory_order_relaxed)) {}
-  WorkCount& operator=(const WorkCount& other) {
-    n_.store(other.n_.load(std::memory_order_relaxed), std::memory_order_relaxed);
-    return *this;
-  }
-  void operator++() { n_.fetch_add(1, std::memory_order_relaxed); }
-  operator long() const { return n_.load(std::memory_order_relaxed); }
-
- private:
-  std::atomic<long> n_{0};
-};
-
-/// Counts of work actually done; a scene without a feature must leave its counters at zero (tested).
+/// Calls of a term's functions: work actually done.
 struct TermCounters {
-  WorkCount energy, gradient, hessian, update;
+  WorkCount prepare, energy, gradient, hessian, update;
+  WorkCount tangent, adjoint;  ///< of sweeps for derivatives
 };
 
 class Term {
@@ -103,6 +88,8 @@ class Term {
   int num_points() const { return num_points_; }
   /// Doubles of State::history that belong to this term.
   std::size_t history_size() const { return static_cast<std::size_t>(num_points_) * kernels_->ns; }
+  /// Memory of the groups' arrays, bytes. History and prepared data are not part of it.
+  std::size_t bytes() const;
   /// The law's own data, for tests and reports.
   template <class Law>
   const Law& law() const {

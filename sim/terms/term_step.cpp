@@ -11,6 +11,7 @@ namespace rhytid {
 
 void Term::prepare(const StepInfo& step, const VectorXd& native, const VectorXd& u_old, const double* s_old,
                    TermStepData& data) const {
+  ++counters_.prepare;
   data.theta = load_theta(step, native);
   if (kernels_->np == 0) return;
   data.prepared.resize(static_cast<std::size_t>(num_points_) * kernels_->np);

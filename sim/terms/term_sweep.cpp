@@ -10,6 +10,7 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
   constexpr int D = kDirections;
   const int nt = kernels_->ntheta, ns = kernels_->ns;
   if (!df && (ns == 0 || !ds_new)) return;
+  ++counters_.tangent;
   std::vector<std::vector<std::vector<double>>> dtheta;  // per direction, per group
   for (const VectorXd* direction : dir.dnative) dtheta.push_back(load_theta_direction(step, *direction));
   // Parameter directions at the points of an element, [nq][nt][D]; empty without any.
@@ -51,6 +52,7 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
 void Term::adjoint_update(const StepInfo& step, const TermStepData& data, const VectorXd& u,
                           const double* s_bar, VectorXd& u_bar) const {
   if (kernels_->ns == 0) return;
+  ++counters_.adjoint;
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
     ElementVectors bars(groups_[gi], 3);
     for_elements(*this, gi, step, data, [&](const TermElement& e) {
@@ -65,6 +67,7 @@ void Term::adjoint_update(const StepInfo& step, const TermStepData& data, const 
 void Term::adjoint_step(const StepInfo& step, const TermStepData& data, const VectorXd& u,
                         const VectorXd& u_old, const double* s_old, const VectorXd& adj, const double* s_bar,
                         VectorXd& u_old_bar, double* s_old_bar, VectorXd& native_bar) const {
+  ++counters_.adjoint;
   const int nt = kernels_->ntheta, ns = kernels_->ns;
   std::vector<double> theta_bar(static_cast<std::size_t>(num_points_) * nt, 0.0);
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {

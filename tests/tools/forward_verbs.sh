@@ -60,6 +60,9 @@ PYTHON
 }
 
 expect 0 0 '^  viscosity +left out: no layer relaxes$' check tiny.json --set /skin/layers/soft/relaxing_fraction=0
+expect 0 0 '^  viscosity +nothing: 0 evaluations, 0 points, 0 numbers of history, 0 bytes$' \
+  check tiny.json --set /skin/layers/soft/relaxing_fraction=0
+expect 0 0 '^  viscosity +3 evaluations of [0-9]+ points, [1-9][0-9]* numbers of history, [0-9.]+ MB$' check tiny.json
 expect 0 0 '^  residual at rest +0 N, exactly an equilibrium$' check tiny.json
 expect 0 0 '^  pictures +about .* more: 2 of each of 5 frames' check tiny.json
 expect 0 0 '^ +"unknowns": 135,$' check tiny.json --json

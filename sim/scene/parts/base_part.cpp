@@ -78,8 +78,11 @@ void BasePart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
   add_upright_slots(g);
   term.add_group(std::move(g));
   model.terms.push_back(std::move(term));
-  features.push_back({"base contact", true,
-                      b.points ? "inner surface on the points of " + b.points->file : "inner surface"});
+  features.push_back({"base contact",
+                      true,
+                      b.points ? "inner surface on the points of " + b.points->file : "inner surface",
+                      {static_cast<int>(model.terms.size()) - 1},
+                      {static_cast<int>(model.shapes.size()) - 1}});
 }
 
 void BasePart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {

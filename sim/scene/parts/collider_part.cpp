@@ -48,7 +48,10 @@ void ColliderPart::add_native_blocks(const Scene& scene, Model& model) const {
 
 void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const {
   const TriangleRule& rule = triangle_rule(contact_degree(scene));
-  bool friction = false;
+  FeatureNote contact{
+      "contact", !scene.colliders.empty(),
+      scene.colliders.empty() ? "no colliders" : std::to_string(scene.colliders.size()) + " colliders"};
+  FeatureNote friction{"friction", false, "no collider has friction"};
   for (const ColliderScene& c : scene.colliders) {
     model.shapes.push_back(collider_shape(c));
     const ImplicitShape* shape = model.shapes.back().get();
@@ -62,10 +65,13 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
       add_centre_slots(motion, path_now, base, g);
       add_orientation_slots(c, motion, path_now, base, g);
       term.add_group(std::move(g));
+      contact.terms.push_back(static_cast<int>(model.terms.size()));
+      contact.shapes.push_back(static_cast<int>(model.shapes.size()) - 1);
       model.terms.push_back(std::move(term));
     }
     if (has_friction(c)) {
-      friction = true;
+      friction.present = true;
+      friction.detail = "lagged pressure and normal at every contact point";
       Term term(
           "friction " + c.name, friction_kernels(),
           FrictionLaw{shape, c.onset, c.friction->slip_speed,
@@ -75,15 +81,12 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
       for (const ThetaSlot::Kind kind : {path_now, path_old}) add_centre_slots(motion, kind, base, g);
       for (const ThetaSlot::Kind kind : {path_now, path_old}) add_orientation_slots(c, motion, kind, base, g);
       term.add_group(std::move(g));
+      friction.terms.push_back(static_cast<int>(model.terms.size()));
       model.terms.push_back(std::move(term));
     }
   }
-  const bool contact = !scene.colliders.empty();
-  features.push_back(
-      {"contact", contact, contact ? std::to_string(scene.colliders.size()) + " colliders" : "no colliders"});
-  features.push_back(
-      {"friction", friction,
-       friction ? "lagged pressure and normal at every contact point" : "no collider has friction"});
+  features.push_back(std::move(contact));
+  features.push_back(std::move(friction));
 }
 
 void ColliderPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {

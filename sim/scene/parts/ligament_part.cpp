@@ -67,6 +67,7 @@ struct LigamentPart::HeatCache {
   };
   std::mutex mutex;
   std::list<Entry> entries;
+  long solved = 0;
 };
 
 LigamentPart::LigamentPart(const Scene& scene, const SkinMesh& mesh)
@@ -107,9 +108,11 @@ void LigamentPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
              {ThetaSlot::Kind::field, model.native_block("ligaments/b").offset, {}}};
   term.add_group(std::move(g));
   model.terms.push_back(std::move(term));
-  features.push_back({"ligaments", true,
+  features.push_back({"ligaments",
+                      true,
                       given_map_.size() > 0 ? std::string("a map by vertex")
-                                            : std::to_string(source_positions_.size()) + " sources"});
+                                            : std::to_string(source_positions_.size()) + " sources",
+                      {static_cast<int>(model.terms.size()) - 1}});
 }
 
 std::shared_ptr<const HeatMapWeights> LigamentPart::heat(double time) const {
@@ -122,6 +125,7 @@ std::shared_ptr<const HeatMapWeights> LigamentPart::heat(double time) const {
   } else {
     entries.push_front({time, std::make_shared<const HeatMapWeights>(
                                   diffuse_sources(inner_, column_triangles_, heat_sources_, time))});
+    ++heat_cache_->solved;
     if (entries.size() > kHeatMapsKept) entries.pop_back();
   }
   return entries.front().weights;
@@ -130,6 +134,20 @@ std::shared_ptr<const HeatMapWeights> LigamentPart::heat(double time) const {
 std::size_t LigamentPart::heat_maps_kept() const {
   const std::lock_guard lock(heat_cache_->mutex);
   return heat_cache_->entries.size();
+}
+
+long LigamentPart::heat_maps_solved() const {
+  const std::lock_guard lock(heat_cache_->mutex);
+  return heat_cache_->solved;
+}
+
+std::size_t LigamentPart::bytes() const {
+  auto numbers = static_cast<std::size_t>(inner_.size() + given_map_.size());
+  const std::lock_guard lock(heat_cache_->mutex);
+  for (const HeatCache::Entry& entry : heat_cache_->entries)
+    numbers +=
+        static_cast<std::size_t>(entry.weights->weights.size() + entry.weights->d_weights_d_time.size());
+  return numbers * sizeof(double) + column_triangles_.size() * sizeof(column_triangles_[0]);
 }
 
 VectorXd LigamentPart::map(const Scene& scene) const {

@@ -36,6 +36,10 @@ class LigamentPart final : public ScenePart {
   /// How many maps are kept now.
   std::size_t heat_maps_kept() const;
   static constexpr std::size_t kHeatMapsKept = 4;
+  /// Heat maps solved so far, those no longer kept among them.
+  long heat_maps_solved() const;
+  /// Memory of the surface the maps are solved on, of the maps kept and of a given map, bytes.
+  std::size_t bytes() const;
 
  private:
   struct HeatCache;

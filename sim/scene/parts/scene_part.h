@@ -15,11 +15,14 @@
 
 namespace rhytid {
 
-/// A term of the scene and whether it is there, with the reason when not: what `check` prints.
+/// A feature of the scene and whether it is there, with the reason when not: what `check` prints.
 struct FeatureNote {
   std::string feature;
   bool present;
   std::string detail;
+  /// What the feature added to the model: indices of its terms and shapes. Empty without the feature, and for
+  /// constraints (held parts, sliding rim), which remove unknowns and cost nothing.
+  std::vector<int> terms = {}, shapes = {};
 };
 
 class ScenePart {

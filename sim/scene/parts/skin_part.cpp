@@ -101,6 +101,10 @@ void SkinPart::add_native_blocks(const Scene& scene, Model& model) const {
 
 void SkinPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNote>& features) const {
   const SkinScene& skin = scene.skin;
+  FeatureNote viscosity{"viscosity", false, "no layer relaxes"};
+  FeatureNote tension{"pre-stretch", skin.pre_stretch.has_value(),
+                      skin.pre_stretch ? "frame 0 is the relaxed equilibrium under tension"
+                                       : "no /skin/pre_stretch in the scene"};
   // A layer without a Maxwell branch keeps no history and skips its logarithm; a term exists only if a layer
   // needs it.
   for (bool viscous : {true, false}) {
@@ -120,7 +124,14 @@ void SkinPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
         }
         term.add_group(std::move(g));
       }
-    if (!term.groups().empty()) model.terms.push_back(std::move(term));
+    if (term.groups().empty()) continue;
+    if (viscous) {
+      viscosity.present = true;
+      viscosity.detail = "Maxwell history at every skin point";
+      viscosity.terms.push_back(static_cast<int>(model.terms.size()));
+    }
+    if (skin.pre_stretch) tension.terms.push_back(static_cast<int>(model.terms.size()));
+    model.terms.push_back(std::move(term));
   }
   if (skin.volume == VolumeQuadrature::reduced) {
     Term term("skin volume", volume_kernels(), VolumeLaw{});
@@ -134,12 +145,8 @@ void SkinPart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
       }
     model.terms.push_back(std::move(term));
   }
-  const bool any = std::any_of(skin.layers.begin(), skin.layers.end(),
-                               [&](const LayerScene& l) { return relaxing_part(scene, l) > 0; });
-  features.push_back({"viscosity", any, any ? "Maxwell history at every skin point" : "no layer relaxes"});
-  features.push_back({"pre-stretch", skin.pre_stretch.has_value(),
-                      skin.pre_stretch ? "frame 0 is the relaxed equilibrium under tension"
-                                       : "no /skin/pre_stretch in the scene"});
+  features.push_back(std::move(viscosity));
+  features.push_back(std::move(tension));
 }
 
 void SkinPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
