@@ -29,14 +29,14 @@ void check_times(const Track& track, double frame_rate) {
                                          : std::string()));
 }
 
-/// The surface that frame 0 shows: at rest, or settled under its pre-stretch (initial parameters).
+/// The surface that frame 0 shows: at rest, or settled (initial parameters).
 SkinMesh first_frame_mesh(const SceneModel& model, const RunOptions& options) {
   SkinMesh mesh = model.model().mesh;
   if (!options.settle) return mesh;
   RunOptions settle_only = options;
   settle_only.frames = 0;
   const Trajectory settled = simulate(model.model(), model.native(), settle_only);
-  if (!settled.complete) throw InputError("fit: /skin/pre_stretch", settled.failure, "a scene that settles");
+  if (!settled.complete) throw InputError("fit: frame 0", settled.failure, "a scene that settles");
   const VectorXd& u = settled.at_frame(0).u;
   for (int n = 0; n < mesh.num_nodes(); ++n) mesh.rest.row(n) += u.segment<3>(3 * n).transpose();
   return mesh;

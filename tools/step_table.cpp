@@ -135,7 +135,7 @@ One row per converged step; the header carries the units. NAME stands for an ene
 | column | unit | meaning |
 | --- | --- | --- |
 | `step` | | number of the row, from 1 |
-| `frame` | | frame that the step leads to or lies before; 0: the skin settles under its pre-stretch |
+| `frame` | | frame that the step leads to or lies before; 0: the skin settles under its pre-stretch or displaced held parts |
 | `time` | s | end of the step |
 | `dt` | s | its length; shorter than usual after a bisection |
 | `NAME_energy` | mJ | energy of a term that is a function of the shape alone, now |

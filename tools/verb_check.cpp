@@ -231,8 +231,12 @@ void print(const Findings& f, std::ostream& out) {
   lines.heading("Physics");
   for (const FeatureNote& n : f.scene_model.features())
     lines.row(n.feature, (n.present ? "yes: " : "left out: ") + n.detail);
-  lines.row("residual at rest", f.cost.rest_residual == 0 ? "0 N, exactly an equilibrium"
-                                                          : number_text(f.cost.rest_residual) + " N");
+  const bool settles = f.scene_model.run_options().settle;
+  lines.row("residual at rest",
+            f.cost.rest_residual == 0
+                ? "0 N, exactly an equilibrium"
+                : number_text(f.cost.rest_residual) +
+                      (settles ? " N, from which the skin settles before frame 0" : " N"));
   if (f.wrinkles)
     lines.row("wrinkles", f.wrinkles->film + " on " + f.wrinkles->soft + ": wavelength " +
                               format_quantity(f.wrinkles->wavelength, dimension::length, 3) +

@@ -246,7 +246,8 @@ std::vector<Rule> skin_rules() {
       {.pointer = "/skin/held/*/path",
        .type = array,
        .min = 1,
-       .doc = "Displacement over time: straight between knots, constant outside; without it the part stays."},
+       .doc = "Displacement over time: straight between knots, constant outside; without it the part stays. "
+              "Where it is not zero at time 0, frame 0 is the relaxed equilibrium with the part there."},
       {.pointer = "/skin/held/*/path/*", .type = object, .doc = "One knot."},
       {.pointer = "/skin/held/*/path/*/time",
        .type = number,

@@ -10,6 +10,16 @@
 
 namespace rhytid {
 
+namespace {
+
+/// Whether a held part is away from its rest position at time 0: the rest shape is then no equilibrium.
+bool is_moved_at_start(const Model& model) {
+  const VectorXd given = model.given_displacement(0);
+  return given.size() > 0 && given.cwiseAbs().maxCoeff() > 0;
+}
+
+}  // namespace
+
 SceneModel::SceneModel(Scene scene) : scene_(std::move(scene)) {
   model_.mesh = build_skin_mesh(scene_);
   parts_.push_back(std::make_shared<SkinPart>(scene_));
@@ -32,9 +42,11 @@ SceneModel::SceneModel(Scene scene) : scene_(std::move(scene)) {
   for (const auto& part : parts_) part->add_terms(scene_, model_, features_);
   model_.constraints = skin_constraints(model_.mesh, scene_.skin, scene_.file);
   if (!scene_.skin.held.empty())
-    features_.push_back({"held parts", true,
-                         std::to_string(scene_.skin.held.size()) + " parts, of these " +
-                             std::to_string(model_.constraints.moved.size()) + " moved"});
+    features_.push_back(
+        {"held parts", true,
+         std::to_string(scene_.skin.held.size()) + " parts, of these " +
+             std::to_string(model_.constraints.moved.size()) + " moved" +
+             (is_moved_at_start(model_) ? "; frame 0 is the relaxed equilibrium there" : "")});
   if (scene_.skin.rim == RimCondition::sliding)
     features_.push_back({"sliding rim", true,
                          std::to_string(model_.mesh.rim_columns.size()) + " columns, of these " +
@@ -48,7 +60,7 @@ RunOptions SceneModel::run_options() const {
   o.frame_rate = scene_.time.frame_rate;
   o.frames = scene_.time.frames;
   o.substeps = scene_.time.substeps;
-  o.settle = scene_.skin.pre_stretch.has_value();
+  o.settle = scene_.skin.pre_stretch.has_value() || is_moved_at_start(model_);
   o.lag_passes = scene_.time.lag_passes;
   o.max_bisections = scene_.time.max_bisections;
   MinimiserOptions& m = o.minimiser;

@@ -17,8 +17,8 @@ struct RunOptions {
   int substeps = 1;        ///< steps per frame
   int frames_done = 0;     ///< frames behind `initial`, when it continues a run that began at time 0
   /// Before frame 0 the skin comes to rest: one step of kSettlingTime that ends at time 0 with the damper
-  /// fully relaxed. Needed when the rest shape is under tension (pre-stretch). It is not taken when
-  /// frames_done > 0.
+  /// fully relaxed. Needed when the rest shape is under tension (pre-stretch) or held parts are displaced at
+  /// time 0 already. It is not taken when frames_done > 0.
   bool settle = false;
   int lag_passes = 1;      ///< solves per step over the lag of friction (step_passes.h)
   int max_bisections = 4;  ///< a step that fails is halved at most this often

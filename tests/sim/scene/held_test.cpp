@@ -96,6 +96,33 @@ TEST(Held, AViscousRunContinuedFromAFrameHasTheSameBits) {
   EXPECT_EQ(rest.steps.back().state.u, whole.steps.back().state.u);
 }
 
+// A part that is away from its rest position at time 0 is there in frame 0, and the skin at rest with it: the
+// steps after it find nothing to do and nothing to dissipate.
+TEST(Held, DisplacedFromTheStartTheSkinSettlesFirst) {
+  const std::string stretched = R"(, "path": [{"time": 0, "displacement": [2, 0, 0.5]}])";
+  const SceneModel built(
+      scene(bar("", stretched), {"/skin/layers/rubber/relaxing_fraction=0.8", "/time/frames=3"}));
+  RunOptions options = built.run_options();
+  EXPECT_TRUE(options.settle);
+  options.account_energies = true;
+  const Trajectory run = simulate(built.model(), built.model().native, options);
+  ASSERT_TRUE(run.complete) << run.failure;
+  ASSERT_EQ(run.steps.front().frame, 0);
+  const VectorXd& u = run.at_frame(0).u;
+  for (const MovedNodes& part : built.model().constraints.moved)
+    for (const int node : part.nodes) EXPECT_EQ(u.segment<3>(3 * node), Vec3(2, 0, 0.5));
+  const double stored = run.steps.front().energies.stored;
+  // The relaxed bar: a fifth of ½ E ε² V in shear, all of it in volume.
+  EXPECT_GT(stored, 0.1 * 0.5 * 1 * 1e-2 * 80);
+  for (std::size_t i = 1; i < run.steps.size(); ++i) {
+    EXPECT_LT((run.steps[i].state.u - u).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_NEAR(run.steps[i].energies.stored, stored, 1e-9 * stored);
+    EXPECT_NEAR(run.steps[i].energies.numerical, 0, 1e-9 * stored);
+    EXPECT_NEAR(run.steps[i].energies.dissipated, 0, 1e-9 * stored);
+  }
+  EXPECT_FALSE(SceneModel(scene(bar("", kShift))).run_options().settle);
+}
+
 TEST(Held, ErrorsNameThePart) {
   EXPECT_THAT(
       error_of(bar("", kShift), {"/skin/held/right/box/low=[10,-2,5]", "/skin/held/right/box/high=[10,2,6]"}),
