@@ -12,6 +12,7 @@
 #include "sim/scene/skin_rule.h"
 #include "sim/scene/validate.h"
 #include "sim/scene/vertex_values.h"
+#include "sim/solve/minimise.h"
 
 namespace rhytid {
 namespace {
@@ -191,9 +192,25 @@ void check_quadrature(const SkinScene& skin, const LocatedJson& resolved) {
   }
 }
 
-Scene to_scene(const LocatedJson& located, const std::string& file) {
-  const LocatedJson resolved = resolve_against_rules(located);
+/// The scene as the rules read it. `lbfgs_literal` stands for the publication's values of what is not given.
+LocatedJson resolve_scene(LocatedJson scene) {
+  if (scene.json.is_object() && scene.json.value("solver", json()).is_object() &&
+      scene.json["solver"].value("minimiser", json()) == name(Minimiser::lbfgs_literal)) {
+    const MinimiserOptions published = published_minimiser();
+    json solver = {{"relative_tolerance", published.relative_tolerance},
+                   {"absolute_tolerance", published.absolute_tolerance},
+                   {"lbfgs_memory", published.lbfgs_memory},
+                   {"lbfgs_refresh", published.lbfgs_refresh}};
+    solver.update(scene.json["solver"]);
+    scene.json["solver"] = std::move(solver);
+  }
+  LocatedJson resolved = resolve_against_rules(scene);
   check_consistency(resolved);
+  return resolved;
+}
+
+Scene to_scene(LocatedJson located, const std::string& file) {
+  const LocatedJson resolved = resolve_scene(std::move(located));
   Scene scene;
   Reader reader(resolved.json);
   fields(reader, scene);
@@ -246,9 +263,7 @@ Scene load_scene(const std::string& path, const std::vector<std::string>& overri
 }
 
 json scene_with_defaults(const json& value) {
-  const LocatedJson resolved = resolve_against_rules(without_lines(value, ""));
-  check_consistency(resolved);
-  return resolved.json;
+  return resolve_scene(without_lines(value, "")).json;
 }
 
 json scene_to_json(const Scene& scene) {

@@ -134,7 +134,9 @@ struct TimeScene {
 };
 
 struct SolverScene {
-  std::string minimiser = "newton";  ///< newton | newton_projected | lbfgs
+  /// newton | newton_projected | lbfgs | lbfgs_literal. A file with the last has the publication's values
+  /// (published_minimiser) for those of the keys below that it leaves out.
+  std::string minimiser = "newton";
   double relative_tolerance = 1e-9;
   double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;

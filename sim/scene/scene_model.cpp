@@ -64,9 +64,9 @@ RunOptions SceneModel::run_options() const {
   o.lag_passes = scene_.time.lag_passes;
   o.max_bisections = scene_.time.max_bisections;
   MinimiserOptions& m = o.minimiser;
-  m.method = scene_.solver.minimiser == "lbfgs"              ? Minimiser::lbfgs
-             : scene_.solver.minimiser == "newton_projected" ? Minimiser::newton_projected
-                                                             : Minimiser::newton;
+  for (const Minimiser method :
+       {Minimiser::newton, Minimiser::newton_projected, Minimiser::lbfgs, Minimiser::lbfgs_literal})
+    if (scene_.solver.minimiser == name(method)) m.method = method;
   m.relative_tolerance = scene_.solver.relative_tolerance;
   m.absolute_tolerance = scene_.solver.absolute_tolerance;
   m.max_iterations = scene_.solver.max_iterations;

@@ -40,7 +40,8 @@ class Minimisation {
  private:
   using Status = MinimiserStatus;
 
-  Status lbfgs_then_newton();
+  /// Ends with newton() unless the method is literal.
+  Status lbfgs();
   Status newton();
   std::optional<Status> start();
   /// Makes `next` the current point; interrupted or nothing.
@@ -245,10 +246,11 @@ MinimiserStatus Minimisation::newton() {
   }
 }
 
-MinimiserStatus Minimisation::lbfgs_then_newton() {
+MinimiserStatus Minimisation::lbfgs() {
   LbfgsMemory memory(options_.lbfgs_memory);
-  int since_refresh = -1;  // no factor yet
-  while (!small()) {
+  int since_refresh = -1;       // no factor yet
+  std::optional<Status> stuck;  // why it goes no further
+  while (!small() && !stuck) {
     if (report_.iterations >= options_.max_iterations) return Status::max_iterations;
     if (since_refresh < 0 || since_refresh >= options_.lbfgs_refresh) {
       if (!factor_projected()) return no_projected_factor();
@@ -262,7 +264,8 @@ MinimiserStatus Minimisation::lbfgs_then_newton() {
     if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
     report_.evaluations += found.evaluations;
     if (!found.accepted) {
-      if (since_refresh == 0) break;  // a fresh factor and no progress: over to Newton
+      if (since_refresh == 0)  // a fresh factor and no progress
+        stuck = std::abs(slope) <= noise ? Status::stagnated : Status::line_search_failed;
       since_refresh = -1;
       continue;
     }
@@ -270,8 +273,9 @@ MinimiserStatus Minimisation::lbfgs_then_newton() {
     since_refresh = found.step < kLbfgsRefreshStep ? -1 : since_refresh + 1;
     ++report_.lbfgs_iterations;
     if (const auto stop = accept(std::move(found.next))) return *stop;
-    if (!small() && stagnates(slope, noise, kPatience)) break;
+    if (!small() && stagnates(slope, noise, kPatience)) stuck = Status::stagnated;
   }
+  if (options_.method == Minimiser::lbfgs_literal) return stuck.value_or(Status::converged);
   stagnant_steps_ = 0;
   return newton();
 }
@@ -280,7 +284,9 @@ MinimiserReport Minimisation::run() {
   if (const auto stop = start()) {
     report_.status = *stop;
   } else {
-    report_.status = options_.method == Minimiser::lbfgs ? lbfgs_then_newton() : newton();
+    const bool starts_with_lbfgs =
+        options_.method == Minimiser::lbfgs || options_.method == Minimiser::lbfgs_literal;
+    report_.status = starts_with_lbfgs ? lbfgs() : newton();
     q_ = at_.q;
   }
   return std::move(report_);
@@ -298,6 +304,17 @@ void MinimiserOptions::validate() const {
   require(lbfgs_refresh >= 1, "MinimiserOptions: lbfgs_refresh must be at least 1");
 }
 
+MinimiserOptions published_minimiser() {
+  MinimiserOptions options;
+  options.method = Minimiser::lbfgs_literal;
+  options.relative_tolerance = 0;
+  options.absolute_tolerance = 1e-6;
+  options.lbfgs_memory = 10;
+  options.lbfgs_refresh = 50;
+  options.certify_minimum = false;
+  return options;
+}
+
 const char* name(Minimiser method) {
   switch (method) {
     case Minimiser::newton:
@@ -306,6 +323,8 @@ const char* name(Minimiser method) {
       return "newton_projected";
     case Minimiser::lbfgs:
       return "lbfgs";
+    case Minimiser::lbfgs_literal:
+      return "lbfgs_literal";
   }
   return "unknown";
 }

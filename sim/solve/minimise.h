@@ -1,7 +1,7 @@
 // The minimisers: Newton with projection on demand (default) and L-BFGS over a frozen factor (the
-// publication's, and ours), with a certificate that the result is a minimum.
+// publication's, and ours), with a certificate that the result is a minimum. README.md has the algorithms.
 //
-// Source   DESIGN section 3; paper.tex "Non-Linear Solver".
+// Source   paper.tex "Non-Linear Solver" (literal L-BFGS).
 #pragma once
 
 #include <functional>
@@ -16,7 +16,8 @@ namespace rhytid {
 enum class Minimiser {
   newton,  ///< raw Hessian; per-point projected one for two iterations when it is not positive definite
   newton_projected,  ///< always projected (baseline)
-  lbfgs,             ///< L-BFGS over a projected factor (publication: memory 10, refresh 50)
+  lbfgs,             ///< L-BFGS over a projected factor, then Newton for the certificate
+  lbfgs_literal,     ///< L-BFGS to its end as published: no Newton, hence no certificate and no polish
 };
 
 struct MinimiserOptions {
@@ -34,6 +35,10 @@ struct MinimiserOptions {
   bool polish = false;
   void validate() const;  ///< throws ContractError naming the field
 };
+
+/// What the publication says of its L-BFGS: a new factor every 50 iterations (and after a step below 1e-6),
+/// converged at |gradient|₂ ≤ 1e-6 (N; it names no unit). Its number of pairs it does not say: 10.
+MinimiserOptions published_minimiser();
 
 enum class MinimiserStatus {
   converged,
@@ -70,7 +75,8 @@ using IterationCallback = std::function<bool(int iteration, double energy, doubl
 
 /// Minimises from q (in/out). On return with status converged and certify_minimum, `factor` holds the raw
 /// Hessian's factor and `matrix` the raw Hessian, at the solution or, after a polish, one step before it.
-/// L-BFGS hands over to Newton when its gradient test holds (certificate) or when it can go no further.
+/// `lbfgs` hands over to Newton when its gradient test holds (certificate) or when it can go no further;
+/// `lbfgs_literal` ends there, with the last projected factor.
 [[nodiscard]] MinimiserReport minimise(Objective& objective, VectorXd& q, const MinimiserOptions& options,
                                        CholeskyFactor& factor, BlockMatrix& matrix,
                                        const IterationCallback& callback = {});

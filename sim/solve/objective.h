@@ -19,8 +19,8 @@ class Objective {
   /// Energy [mJ] at q; +inf where it is not defined (J ≤ 0, overflow). Writes the gradient [N] when asked and
   /// finite.
   virtual double energy(const VectorXd& q, VectorXd* gradient) = 0;
-  /// Sum over points of the absolute internal forces at the last gradient evaluation [N]: the scale against
-  /// which the residual is judged.
+  /// 2-norm over all components of the sum of absolute element forces, at the last evaluation with a gradient
+  /// [N]: the scale against which the residual is judged.
   virtual double force_scale() const = 0;
   /// Hessian at q into `out` (set to zero first).
   virtual void hessian(const VectorXd& q, Curvature curvature, BlockMatrix& out) = 0;

@@ -119,7 +119,7 @@ TEST(Domain, FiniteExactlyWhereNoPointIsInverted) {
 
 TEST(Domain, NoInvertedStateIsEverAccepted) {
   // 0.9 mm into 1.65 mm of skin in one step, without halving; every minimiser.
-  for (const char* minimiser : {"newton", "newton_projected", "lbfgs"}) {
+  for (const char* minimiser : {"newton", "newton_projected", "lbfgs", "lbfgs_literal"}) {
     const SceneModel m(parse_scene_text(
         drag_scene(2, 1), "press.json",
         {"/skin/surface/grid/cells=[4,3]", "/skin/layers/soft/order=1", "/time/max_bisections=0",

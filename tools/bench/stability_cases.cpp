@@ -161,6 +161,7 @@ void add_degenerate(CaseList& list) {
            CaseList::clear_outcome);
   list.add("minimiser", "newton_projected", {"/solver/minimiser=newton_projected"});
   list.add("minimiser", "lbfgs", {"/solver/minimiser=lbfgs"});
+  list.add("minimiser", "lbfgs_literal", {"/solver/minimiser=lbfgs_literal"});
 }
 
 /// Several extremes at once, drawn with a fixed seed: what one-at-a-time sweeps cannot see.

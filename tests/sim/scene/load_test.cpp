@@ -82,6 +82,31 @@ TEST(LoadScene, ReadsEveryPartInInternalUnits) {
   EXPECT_EQ(scene.output.every, 2);
 }
 
+TEST(LoadScene, LiteralLbfgsHasThePublishedValuesOfWhatIsNotGiven) {
+  const auto solver_of = [](const std::vector<std::string>& settings) {
+    return parse_scene_text(minimal_scene, "a.json", settings).solver;
+  };
+  const SolverScene literal = solver_of({"/solver/minimiser=lbfgs_literal"});
+  EXPECT_EQ(literal.lbfgs_memory, 10);
+  EXPECT_EQ(literal.lbfgs_refresh, 50);
+  EXPECT_EQ(literal.relative_tolerance, 0);
+  EXPECT_EQ(literal.absolute_tolerance, 1e-6);
+  EXPECT_EQ(literal.max_iterations, SolverScene().max_iterations);
+  const SolverScene given = solver_of(
+      {"/solver/minimiser=lbfgs_literal", "/solver/relative_tolerance=1e-9", "/solver/lbfgs_memory=7"});
+  EXPECT_EQ(given.relative_tolerance, 1e-9);
+  EXPECT_EQ(given.lbfgs_memory, 7);
+  EXPECT_EQ(given.lbfgs_refresh, 50);
+  EXPECT_EQ(solver_of({"/solver/minimiser=lbfgs"}).lbfgs_refresh, 20);
+
+  const Scene scene = parse_scene_text(minimal_scene, "a.json", {"/solver/minimiser=lbfgs_literal"});
+  const json written = scene_to_json(scene);
+  EXPECT_EQ(scene_to_json(parse_scene(written, "a.json")), written);
+  EXPECT_EQ(scene_with_defaults(
+                {{"skin", written["skin"]}, {"solver", {{"minimiser", "lbfgs_literal"}}}})["solver"],
+            written["solver"]);
+}
+
 TEST(LoadScene, RoundTrips) {
   for (const char* text : {minimal_scene, full_scene}) {
     const json written = scene_to_json(parse_scene_text(text, "a.json"));

@@ -73,6 +73,34 @@ TEST(Minimise, AllMinimisersFindTheEndOfTheValley) {
   }
 }
 
+TEST(Minimise, LiteralLbfgsGoesToItsEndAlone) {
+  RosenbrockChain objective(12);
+  MinimiserOptions options = published_minimiser();
+  EXPECT_EQ(options.lbfgs_refresh, 50);
+  options.max_iterations = 3000;
+  options.certify_minimum = options.polish = true;  // there is nothing that could
+  const auto [report, q, factor, matrix] = solve(objective, random_vector(36, 0, 0.9), options);
+  EXPECT_TRUE(report.converged()) << name(report.status);
+  EXPECT_EQ(report.tolerance, 1e-6);
+  EXPECT_LE(report.residual, 1e-6);
+  EXPECT_EQ(report.iterations, report.lbfgs_iterations);
+  EXPECT_EQ(objective.raw_hessians, 0);
+  EXPECT_GT(report.iterations, 50);
+  EXPECT_EQ(report.factorisations, (report.iterations + 49) / 50) << "no step was below 1e-6 here";
+
+  DoubleWellChain saddle(20);
+  EXPECT_TRUE(solve(saddle, VectorXd::Zero(60), options).report.converged()) << "its gradient test holds";
+  EXPECT_EQ(saddle.projected_hessians, 0);
+
+  // Where nothing more is to be had it says so, and does not call Newton either.
+  QuadraticChain rounding(30);
+  rounding.offset = 1e6;
+  options.absolute_tolerance = 1e-300;
+  const MinimiserReport stopped = solve(rounding, random_vector(90, -1, 1), options).report;
+  EXPECT_EQ(stopped.status, MinimiserStatus::stagnated) << name(stopped.status);
+  EXPECT_EQ(rounding.raw_hessians, 0);
+}
+
 TEST(Minimise, RawHessianConvergesQuadratically) {
   RosenbrockChain objective(12);
   MinimiserOptions options;

@@ -132,6 +132,27 @@ TEST(Simulate, ThreeMinimisersReachTheSameStates) {
   }
 }
 
+TEST(Simulate, LiteralLbfgsReachesTheSameStatesToItsOwnTolerance) {
+  const SceneModel m(small_drag(2, 3));
+  const RunOptions options = m.run_options();
+  const Trajectory newton = run_scene(m, options);
+  RunOptions published = options;
+  published.minimiser = published_minimiser();
+  published.minimiser.max_iterations = 1000;
+  const Trajectory literal = run_scene(m, published);
+  ASSERT_TRUE(newton.complete && literal.complete) << literal.failure;
+  double worst = 0;
+  for (int frame = 1; frame <= newton.frames(); ++frame)
+    worst = std::max(worst, (newton.at_frame(frame).u - literal.at_frame(frame).u).lpNorm<Eigen::Infinity>());
+  std::printf("published minimiser against newton: %.1e mm\n", worst);
+  EXPECT_LE(worst, 1e-5);
+  EXPECT_GT(worst, 1e-9) << "is it Newton after all?";
+  for (const StepRecord& step : literal.steps) {
+    EXPECT_LE(step.report.residual, 1e-6);
+    EXPECT_EQ(step.report.iterations, step.report.lbfgs_iterations);
+  }
+}
+
 TEST(Simulate, WhatIsNotInTheSceneDoesNoWork) {
   Scene s = small_drag(1, 1);
   s.ligaments.reset();
