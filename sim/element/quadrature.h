@@ -15,7 +15,7 @@ struct TrianglePoint {
 
 /// A rule that integrates all polynomials of total degree ≤ `degree` on the reference triangle.
 struct TriangleRule {
-  std::string name;  ///< e.g. "tri10-25": stored with every checkpoint, since C^v lives at these points
+  std::string name;  ///< e.g. "tri10-25"
   int degree;
   std::vector<TrianglePoint> points;
 };
@@ -37,9 +37,9 @@ struct PrismPoint {
   double weight;  ///< weights of a rule sum to the volume 1
 };
 
-/// A rule on the reference prism; `degree` is the total degree in (u, v, w) it integrates.
+/// A rule on the reference prism, where C^v lives; `degree` is the total degree in (u, v, w) it integrates.
 struct PrismRule {
-  std::string name;  ///< e.g. "prism6-28" or "tri10-25 x GL3": stored with every checkpoint
+  std::string name;  ///< e.g. "prism6-28" or "tri10-25 x GL3"
   int degree;
   std::vector<PrismPoint> points;
 };

@@ -23,7 +23,8 @@ def check(files):
 class CheckSources(unittest.TestCase):
     good = {"sim/a.h": HEADER, "adjoint/b.h": HEADER + '#include "sim/a.h"\n',
             "fitting/c.cpp": '#include <ceres/ceres.h>\n#include "adjoint/b.h"\n',
-            "tests/t.cpp": '#include "adjoint/b.h"\n#include "support.h"\n', "tests/support.h": HEADER}
+            "tests/t.cpp": '#include "adjoint/b.h"\n#include "support.h"\n', "tests/support.h": HEADER,
+            "sim/README.md": "`a.h`, `sim/a.h`, `*.h` and `../fitting/c.cpp`, but not what is not quoted: gone.h\n"}
 
     def test_good_tree(self):
         self.assertEqual(check(self.good)[0], 0)
@@ -40,6 +41,8 @@ class CheckSources(unittest.TestCase):
             "no #pragma once": {"sim/x.h": "\n"},
             "at most 500": {"sim/x.cpp": "// line\n" * 501},
             "command line belongs": {"fitting/x.cpp": "#include <CLI/CLI.hpp>\n"},
+            "names gone.h, which": {"sim/README.md": "\n| `a.h` | `gone.h` |\n"},
+            "names ../sim/b.h, which": {"fitting/README.md": "`../sim/b.h`\n"},
         }
         for message, files in offences.items():
             with self.subTest(message):
