@@ -1,34 +1,13 @@
 // The digests by which a log of evaluations knows its own fit.
-#include <filesystem>
-
 #include "fitting/evaluation_log.h"
 #include "fitting/fit.h"
-#include "sim/core/build_info.h"
 #include "sim/core/digest.h"
 #include "sim/scene/load.h"
-#include "sim/solve/blas_info.h"
-#include "sim/terms/kernel_table.h"
 #include "sim/time/model_digest.h"
+#include "sim/time/program_digest.h"
 
 namespace rhytid::fitting {
 namespace {
-
-std::string program_digest() {
-  Digest d;
-  const BuildInfo build = build_info();
-  const BlasInfo blas = blas_info();
-  for (const std::string& s : {build.version, build.build_type, build.compiler, build.sanitizers,
-                               blas.shared_object, blas.config, std::string(skin_kernel_isa())})
-    d.text(s);
-  // A version says too little while the program is being changed.
-  std::error_code error;
-  const std::filesystem::path self("/proc/self/exe");
-  const auto size = std::filesystem::file_size(self, error);
-  if (!error) d.number(static_cast<double>(size));
-  const auto time = std::filesystem::last_write_time(self, error);
-  if (!error) d.number(static_cast<double>(time.time_since_epoch().count()));
-  return d.hex();
-}
 
 std::string scene_digest(const Scene& scene, const FitProblem& problem) {
   nlohmann::json json = scene_to_json(scene);
