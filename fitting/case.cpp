@@ -19,10 +19,6 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-std::vector<std::string> strings(const json& list) {
-  return list.get<std::vector<std::string>>();
-}
-
 RenderCase read_render(const json& j) {
   RenderCase c;
   c.width = j["width"], c.height = j["height"], c.supersampling = j["supersampling"];
@@ -193,19 +189,21 @@ Scene scene_of_fit(const Case& c, const LocatedJson& written) {
 Case load_case(const std::string& path, const std::vector<std::string>& settings) {
   LocatedJson written = read_with_extends(path, case_rule_tree(), "case");
   refuse_scene(written, path, settings);
-  for (const std::string& assignment : settings) apply_override(written, assignment, path, case_rule_tree());
+  for (const std::string& assignment : settings)
+    apply_override(written, {assignment}, path, case_rule_tree());
   const LocatedJson located = resolve_against_rules(written, case_rule_tree());
   const json& root = located.json;
 
   Case c;
   c.file = path, c.name = root["name"];
-  c.scene = root["scene"], c.scene_settings = strings(root["settings"]);
+  c.scene = root["scene"], c.scene_settings = settings_at(located, "/settings");
   if (root.contains("truth")) {
     const json& truth = root["truth"];
     const bool has_scene = truth.contains("scene");
     c.truth_scene = has_scene ? truth["scene"].get<std::string>() : c.scene;
     if (!has_scene) c.truth_settings = c.scene_settings;
-    for (const std::string& setting : strings(truth["settings"])) c.truth_settings.push_back(setting);
+    for (const Setting& setting : settings_at(located, "/truth/settings"))
+      c.truth_settings.push_back(setting);
   }
   c.camera = root.value("camera", "");
   c.footage = root["footage"], c.tracks = root["tracks"];

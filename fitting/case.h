@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/scene/located_json.h"
 #include "sim/scene/parameter.h"
 
 namespace rhytid::fitting {
@@ -65,10 +66,10 @@ struct FitCase {
 
 struct Case {
   std::string name, file;
-  std::string scene;                        ///< path of the scene that the fit uses
-  std::vector<std::string> scene_settings;  ///< "/pointer=value"
-  std::string truth_scene;                  ///< path; empty when the footage is real
-  std::vector<std::string> truth_settings;
+  std::string scene;  ///< path of the scene that the fit uses
+  std::vector<Setting> scene_settings;
+  std::string truth_scene;  ///< path; empty when the footage is real
+  std::vector<Setting> truth_settings;
   std::string camera;           ///< path of the camera file; empty: the automatic one of `render`
   std::string footage, tracks;  ///< paths as given
   RenderCase render;

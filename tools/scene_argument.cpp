@@ -34,27 +34,24 @@ Scene load_scene_argument(const std::string& file, const std::vector<std::string
                           Progress& progress) {
   LocatedJson written = read_with_extends(file, case_rules(), "scene or case");
   if (!written.json.contains("scene") || written.json.contains("skin")) return load_scene(file, settings);
+  if (written.json.contains("variants"))
+    throw InputError(file, "an experiment", "a scene or a case (rhytid study sweep runs experiments)");
 
   std::vector<std::string> of_scene;
   for (const std::string& setting : settings)
     if (is_of_scenes(setting)) {
       of_scene.push_back(setting);
     } else {
-      apply_override(written, setting, file, case_rules());
+      apply_override(written, {setting}, file, case_rules());
     }
   const nlohmann::json& scene = written.json["scene"];
   if (!scene.is_string())
     throw InputError(written.where("/scene") + ": /scene", shown_json(scene), "the path of a scene");
-  std::vector<std::string> all;
-  for (const nlohmann::json& setting : written.json.value("settings", nlohmann::json::array())) {
-    if (!setting.is_string())
-      throw InputError(written.where("/settings") + ": /settings", shown_json(setting), "\"/pointer=value\"");
-    all.push_back(setting);
-  }
+  std::vector<Setting> all = settings_at(written, "/settings");
   const std::string path = scene.get<std::string>();
   progress.note(file + " is a case: this is its scene " + path +
                 (all.empty() ? "" : ", with " + std::to_string(all.size()) + " of its settings"));
-  all.insert(all.end(), of_scene.begin(), of_scene.end());
+  for (const std::string& setting : of_scene) all.push_back({setting});
   return load_scene(path, all);
 }
 

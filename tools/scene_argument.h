@@ -1,5 +1,5 @@
 // The scene that a command line names: FILE is a scene, or a case, which is taken for its scene.
-// Tests: tests/tools/scene_argument_test.cpp
+// Tests: tests/tools/forward_verbs.sh
 #pragma once
 
 #include <string>

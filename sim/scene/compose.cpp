@@ -201,9 +201,31 @@ LocatedJson read_with_extends(const std::string& path, const RuleNode& rules, co
   return read_file(path, "", rules, kind, chain);
 }
 
-void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file,
+std::vector<Setting> of_command_line(const std::vector<std::string>& texts) {
+  std::vector<Setting> settings;
+  for (const std::string& text : texts) settings.push_back({text});
+  return settings;
+}
+
+std::vector<Setting> settings_at(const LocatedJson& located, const std::string& pointer) {
+  std::vector<Setting> settings;
+  const json::json_pointer list(pointer);
+  if (!located.json.contains(list)) return settings;
+  for (const json& item : located.json[list]) {
+    const std::string at = pointer + "/" + std::to_string(settings.size());
+    const std::string where = located.where(at) + ": " + at;
+    if (!item.is_string()) throw InputError(where, shown_json(item), "\"/pointer=value\"");
+    settings.push_back({item, where});
+  }
+  return settings;
+}
+
+void apply_override(LocatedJson& target, const Setting& setting, const std::string& file,
                     const RuleNode& rules) {
-  const std::string where = "--set " + shown_json(assignment);
+  const std::string& assignment = setting.text;
+  const bool is_typed = setting.origin.empty();
+  const std::string where = (is_typed ? "--set " : setting.origin + " ") + shown_json(assignment);
+  const std::string origin = is_typed ? file + " (--set)" : setting.origin;
   const size_t equals = assignment.find('=');
   if (equals == std::string::npos) throw InputError(where, "no '='", "pointer=value");
   const std::vector<std::string> keys = split_pointer(std::string_view(assignment).substr(0, equals), where);
@@ -253,12 +275,12 @@ void apply_override(LocatedJson& target, const std::string& assignment, const st
       if (rule != nullptr) rule = rule->child(key);
     }
     pointer += "/" + escape_key(key);
-    if (!target.origin.contains(pointer)) target.origin[pointer] = file + " (--set)";
+    if (!target.origin.contains(pointer)) target.origin[pointer] = origin;
   }
   *node = value.json;
   if (rule != nullptr) resolve_paths(*node, *rule, fs::path());
   forget(target, pointer);
-  target.origin[pointer] = file + " (--set)";
+  target.origin[pointer] = origin;
 }
 
 }  // namespace rhytid

@@ -224,9 +224,9 @@ Scene to_scene(LocatedJson located, const std::string& file) {
   return scene;
 }
 
-LocatedJson load_located(const std::string& path, const std::vector<std::string>& overrides) {
+LocatedJson load_located(const std::string& path, std::span<const Setting> settings) {
   LocatedJson scene = read_with_extends(path);
-  for (const std::string& assignment : overrides) apply_override(scene, assignment, path);
+  for (const Setting& setting : settings) apply_override(scene, setting, path);
   return scene;
 }
 
@@ -239,7 +239,7 @@ LocatedJson without_lines(const json& value, const std::string& file) {
 }  // namespace
 
 json load_scene_json(const std::string& path, const std::vector<std::string>& overrides) {
-  return load_located(path, overrides).json;
+  return load_located(path, of_command_line(overrides)).json;
 }
 
 Scene parse_scene(const json& value, const std::string& file) {
@@ -254,12 +254,16 @@ Scene parse_scene_text(std::string_view text, const std::string& file,
   scene.json = json::object();
   merge(scene, own);
   scene.origin[""] = own.where("");
-  for (const std::string& assignment : overrides) apply_override(scene, assignment, file);
+  for (const std::string& assignment : overrides) apply_override(scene, {assignment}, file);
   return to_scene(scene, file);
 }
 
 Scene load_scene(const std::string& path, const std::vector<std::string>& overrides) {
-  return to_scene(load_located(path, overrides), path);
+  return load_scene(path, of_command_line(overrides));
+}
+
+Scene load_scene(const std::string& path, std::span<const Setting> settings) {
+  return to_scene(load_located(path, settings), path);
 }
 
 json scene_with_defaults(const json& value) {

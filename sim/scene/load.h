@@ -8,10 +8,12 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "sim/scene/located_json.h"
 #include "sim/scene/scene.h"
 
 namespace rhytid {
@@ -26,8 +28,9 @@ Scene parse_scene(const nlohmann::json& json, const std::string& file);
 Scene parse_scene_text(std::string_view text, const std::string& file,
                        const std::vector<std::string>& overrides = {});
 
-/// The same from a file; messages name the line of the file that wrote the value.
+/// The same from a file; messages name the line of the file that wrote the value, or the setting.
 Scene load_scene(const std::string& path, const std::vector<std::string>& overrides = {});
+Scene load_scene(const std::string& path, std::span<const Setting> settings);
 
 /// The scene with all defaults, all quantities as numbers in internal units: what was run. Valid input again,
 /// and its own fixed point. Throws InputError as parse_scene does.

@@ -17,6 +17,12 @@
 
 namespace rhytid {
 
+/// A change of a file, "pointer=value", that another file or the command line asks for.
+struct Setting {
+  std::string text;
+  std::string origin = {};  ///< where it is written, for messages: "case.json:4: /settings/0"; empty: --set
+};
+
 struct LocatedJson {
   nlohmann::json json;
   std::map<std::string, std::string> origin;  ///< JSON pointer -> "file:line" of the value
@@ -24,6 +30,12 @@ struct LocatedJson {
   /// Origin of the value at `pointer`, or of the closest value around it.
   std::string where(std::string pointer) const;
 };
+
+/// Settings as --set gives them.
+std::vector<Setting> of_command_line(const std::vector<std::string>& texts);
+/// Those that a file lists at `pointer`; none when it lists none. Throws InputError for an item that is no
+/// text.
+std::vector<Setting> settings_at(const LocatedJson& located, const std::string& pointer);
 
 /// A key as it stands in a JSON pointer: ~ -> ~0, / -> ~1.
 std::string escape_key(std::string_view key);
@@ -55,8 +67,9 @@ LocatedJson read_with_extends(const std::string& path, const RuleNode& rules = s
 
 /// Applies "pointer=value": value is JSON or, failing that, a string ("4 MPa"); null removes the value. List
 /// items are addressed by number or by name; missing objects on the way are created. In a list of strings
-/// the number behind the last appends.
-void apply_override(LocatedJson& target, const std::string& assignment, const std::string& file,
+/// the number behind the last appends. Messages about the value then name the setting's origin, or `file`
+/// and --set.
+void apply_override(LocatedJson& target, const Setting& setting, const std::string& file,
                     const RuleNode& rules = scene_rule_tree());
 
 }  // namespace rhytid

@@ -18,6 +18,12 @@ using testing::AllOf;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
+std::vector<std::string> texts(const std::vector<Setting>& settings) {
+  std::vector<std::string> all;
+  for (const Setting& setting : settings) all.push_back(setting.text);
+  return all;
+}
+
 class CaseTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -48,13 +54,20 @@ class CaseTest : public testing::Test {
 TEST_F(CaseTest, SettingsGrowByTheNumberBehindTheLast) {
   const std::string path = write("case.json", R"({"scene": "scene.json"})");
   const Case c = load_case(path, {"/settings/0=/skin/order=3", "/settings/1=/time/frames=5"});
-  EXPECT_THAT(c.scene_settings, testing::ElementsAre("/skin/order=3", "/time/frames=5"));
+  EXPECT_THAT(texts(c.scene_settings), testing::ElementsAre("/skin/order=3", "/time/frames=5"));
 }
 
 TEST_F(CaseTest, ValuesOfTheSceneAreRefusedWithTheWayToSetThem) {
   const std::string hint = error_of(R"({"scene": "scene.json", "settings": ["/time/frames=2"]})",
                                     {"/skin/layers/film/thickness=0.2 mm"});
   EXPECT_THAT(hint, HasSubstr("--set \"/settings/1=/skin/layers/film/thickness=0.2 mm\""));
+  // A setting of the case is no --set.
+  EXPECT_THAT(error_of("{\"scene\": \"scene.json\",\n\"settings\": [\"/skin/ordr=2\"]}"),
+              HasSubstr("case.json:2: /settings/0: /skin/ordr: got"));
+  EXPECT_THAT(error_of("{\"scene\": \"scene.json\",\n\"settings\": [\"/skin/order\"]}"),
+              HasSubstr("case.json:2: /settings/0 \"/skin/order\": got no '='"));
+  EXPECT_THAT(error_of(R"({"scene": "scene.json"})", {"/settings/0=/skin/order=x"}),
+              HasSubstr("case.json (--set): /settings/0: /skin/order: got \"x\""));
   EXPECT_THAT(error_of(R"({"extends": "scene.json"})"), HasSubstr("got a scene, expected a case"));
   write("scene.json", R"({"skin": {"surface": {}, "layers": []}})");
   EXPECT_THAT(error_of(R"({"scene": "scene.json"})"),
@@ -104,7 +117,7 @@ TEST_F(CaseTest, QuantitiesTakeTheUnitOfTheirParameter) {
   EXPECT_EQ(c.render.tilt, 0);
   EXPECT_EQ(c.track.roi, (std::array<double, 4>{1, 2, 30, 40}));
   EXPECT_EQ(c.truth_scene, c.scene);
-  EXPECT_THAT(c.truth_settings,
+  EXPECT_THAT(texts(c.truth_settings),
               testing::ElementsAre("/time/frames=2", "/skin/layers/film/youngs_modulus=2 MPa"));
 }
 
