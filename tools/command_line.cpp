@@ -138,9 +138,9 @@ ExitCode parse_and_run(const Program& program, int argc, const char* const* argv
 
 }  // namespace
 
-void check_setting(const std::string& text) {
+void check_setting(const std::string& text, const std::string& where) {
   if (text.empty() || text[0] != '/' || text.find('=') == std::string::npos) {
-    throw InputError("--set", "'" + text + "'", "/json/pointer=value");
+    throw InputError(where, "'" + text + "'", "/json/pointer=value");
   }
 }
 

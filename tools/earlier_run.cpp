@@ -37,14 +37,16 @@ bool is_run_record(const fs::path& path) {
 
 }  // namespace
 
-std::vector<fs::path> files_of_earlier_run(const std::string& folder) {
+std::vector<fs::path> files_of_earlier_run(const std::string& folder, const std::vector<std::string>& also) {
   const fs::path root = folder;
   std::vector<fs::path> found;
   collect(root / "frames", "frame_", ".vtu", found);
   collect(root / "surface", "frame_", ".vtp", found);
   collect(root / "pictures", "shaded_", ".png", found);
   collect(root / "pictures", "displacement_", ".png", found);
-  for (const char* name : {"frames.pvd", "surface.pvd", "steps.csv", "state.bin"})
+  std::vector<std::string> names = {"frames.pvd", "surface.pvd", "steps.csv", "state.bin"};
+  names.insert(names.end(), also.begin(), also.end());
+  for (const std::string& name : names)
     if (fs::symlink_status(root / name).type() == fs::file_type::regular) found.push_back(root / name);
   std::sort(found.begin(), found.end());
   if (!found.empty() && !is_run_record(root / "run.json"))

@@ -78,7 +78,8 @@ class ForwardRun {
   }
 
   void begin(const State& rest) {
-    const auto earlier = files_of_earlier_run(folder_);
+    const auto earlier =
+        files_of_earlier_run(folder_, listener_ ? listener_->files() : std::vector<std::string>());
     record_.write("running");  // from here on the folder is this run's, also when it is killed below
     for (const std::filesystem::path& file : earlier) {
       std::error_code error;
@@ -108,24 +109,37 @@ class ForwardRun {
 
   /// False when there is nothing to resume from.
   bool restore(RunOptions& options, State& start) {
-    auto checkpoint = read_checkpoint(folder_ + "/state.bin", identity_);
-    if (!checkpoint) {
-      const std::string text = "nothing to resume in " + folder_ + ": the run starts from the beginning";
-      if (listener_) {  // a study resumes whatever is there
-        context_.progress.note(text);
-      } else {
-        context_.progress.warning(text);
-      }
-      return false;
+    std::string reason;
+    try {
+      if (restore_files(options, start)) return true;
+    } catch (const InputError& error) {
+      if (!listener_) throw InputError(std::string(error.what()) + "; without --resume it starts anew");
+      // A study goes on from whatever is there: what cannot be gone on from is nothing.
+      reason = std::string(" (") + error.what() + ")";
+      table_ = StepTable(scene_model_.model());
     }
+    const std::string text =
+        "nothing to resume in " + folder_ + reason + ": the run starts from the beginning";
+    if (listener_) {
+      context_.progress.note(text);
+    } else {
+      context_.progress.warning(text);
+    }
+    return false;
+  }
+
+  /// False without a checkpoint. Throws InputError when it, or a table beside it, is not that of this run.
+  bool restore_files(RunOptions& options, State& start) {
+    auto checkpoint = read_checkpoint(folder_ + "/state.bin", identity_);
+    if (!checkpoint) return false;
     const TimeScene& time = scene_model_.scene().time;
     if (output().csv) {
       const std::string path = folder_ + "/steps.csv";
       table_.restore(read_file(path), checkpoint->frame, checkpoint->carried, path);
     }
+    if (listener_) listener_->resume(checkpoint->frame);
     for (int frame = 0; frame <= checkpoint->frame; ++frame)
       if (is_written(frame)) frames_.restore(frame, frame == 0 ? 0 : 1 / time.frame_rate * frame);
-    if (listener_) listener_->resume(checkpoint->frame);
     options.settle = false;  // the checkpoint lies behind it
     options.frames_done = record_.frames_done = record_.resumed_from = checkpoint->frame;
     start = std::move(checkpoint->state);
@@ -169,7 +183,8 @@ class ForwardRun {
         std::to_string(record_.frames_done) + " of " + std::to_string(frames) + " frames";
     record_.write(run.complete ? "complete" : interrupted ? "interrupted" : "not_converged", run.failure);
     if (interrupted) {
-      context_.progress.note("interrupted after " + where + "; the same command with --resume goes on");
+      context_.progress.note("interrupted after " + where + "; the same command " +
+                             (listener_ ? "" : "with --resume ") + "goes on");
       return ExitCode::interrupted;
     }
     if (!run.complete) {

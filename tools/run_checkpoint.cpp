@@ -63,13 +63,11 @@ std::optional<RunCheckpoint> read_checkpoint(const std::string& path, const std:
         content.size() - end - 1 != (1 + u + velocity + history + carried) * sizeof(double))
       throw std::invalid_argument("size");
   } catch (const std::exception&) {
-    throw InputError(path, "a damaged file",
-                     "the state.bin that a run wrote; without --resume it starts anew");
+    throw InputError(path, "a damaged file", "the state.bin that a run wrote");
   }
   if (c.identity != identity)
-    throw InputError(
-        path, "the state of a different scene",
-        "that of this one (output and number of frames may differ); without --resume it starts anew");
+    throw InputError(path, "the state of a different scene",
+                     "that of this one (output and number of frames may differ)");
   const char* from = content.data() + end + 1;
   const auto take = [&](double* to, std::size_t count) {
     if (count) std::memcpy(to, from, count * sizeof(double));

@@ -1,8 +1,7 @@
 #include "tools/step_table.h"
 
-#include <sstream>
-
 #include "sim/core/error.h"
+#include "sim/output/text.h"
 
 namespace rhytid::tools {
 namespace {
@@ -108,21 +107,20 @@ std::vector<double> StepTable::carried() const {
 
 void StepTable::restore(const std::string& csv, int last_frame, const std::vector<double>& carried,
                         const std::string& path) {
-  const auto refuse = [&] {
-    throw InputError(path, "a table that does not belong to this run", "the steps.csv that the run wrote");
+  const auto refuse = [&](const std::string& found) {
+    throw InputError(path, found, "the steps.csv that the run wrote");
   };
-  std::istringstream lines(csv);
-  std::string line;
-  if (!std::getline(lines, line) || line + "\n" != table_.text() || carried.size() != sums_.size()) refuse();
-  while (std::getline(lines, line)) {
-    // Numbers only, so that the cells are the text between commas; kept as text they come back unchanged.
-    std::vector<CsvCell> cells;
-    std::istringstream row(line);
-    for (std::string cell; std::getline(row, cell, ',');) cells.emplace_back(cell);
-    if (cells.size() < 2) refuse();
-    if (std::stoi(std::get<std::string>(cells[1])) > last_frame) break;
-    table_.add_row(std::move(cells));
-  }
+  if (carried.size() != sums_.size()) refuse("a table that does not belong to this run");
+  double rows = 0, frame = 0;
+  table_.restore(csv, path, [&](const std::vector<double>& row) {  // step and frame lead the columns
+    if (row[1] > last_frame) return false;
+    ++rows;
+    if (row[0] != rows) refuse("step " + short_text(row[0]) + " in row " + short_text(rows));
+    frame = row[1];
+    return true;
+  });
+  if (frame != last_frame)
+    refuse("steps as far as frame " + short_text(frame) + ", not " + std::to_string(last_frame));
   sums_ = carried;
 }
 

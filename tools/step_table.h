@@ -23,7 +23,7 @@ class StepTable {
   /// What the next row needs besides its step, for a checkpoint: the sums since the start.
   std::vector<double> carried() const;
   /// Continues a table: rows of `csv` (text of an earlier table) up to frame `last_frame`, and what was
-  /// carried. Throws InputError naming `path` when the columns differ.
+  /// carried. Throws InputError naming `path` when the columns differ, a row is damaged or one is missing.
   void restore(const std::string& csv, int last_frame, const std::vector<double>& carried,
                const std::string& path);
 

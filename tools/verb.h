@@ -18,8 +18,8 @@ class App;
 
 namespace rhytid::tools {
 
-/// Throws InputError unless `text` reads /json/pointer=value, as --set wants it.
-void check_setting(const std::string& text);
+/// Throws InputError unless `text` reads /json/pointer=value, as --set wants it. `where` names the text.
+void check_setting(const std::string& text, const std::string& where = "--set");
 
 /// The options that all verbs share.
 struct CommonOptions {

@@ -16,9 +16,9 @@ class Study : public Verb {
         "study",
         "many runs of a scene side by side, with their wrinkles measured",
         "`sweep` runs every variant of an experiment.json (a scene and lists of settings) and measures "
-        "crests, "
-        "wavelength, amplitude and extent of the wrinkles after every frame. What is finished is kept: the "
-        "same command after a stop, or a kill, goes on where it was.",
+        "crests, wavelength, amplitude and extent of the wrinkles after every frame. What is finished is "
+        "kept while settings, files and program are the same: the same command after a stop, or a kill, goes "
+        "on where it was.",
         "experiment.json, and the scene and mesh it names",
         "results.csv, results.md, index.html (table, profiles, pictures), and per variant a folder with "
         "the files of `simulate`, wrinkles.csv, profile.csv, above.png and, with ligaments, ligaments.png",
@@ -42,6 +42,7 @@ class Study : public Verb {
     sweep->add_option("--only", only_, "run this variant only; repeatable")
         ->allow_extra_args(false)
         ->option_text("NAME");
+    sweep->add_flag("--anew", anew_, "run from the beginning what is finished or begun");
     sweep->add_option("--set", settings_, "change one value of the scene in all variants; repeatable")
         ->allow_extra_args(false)
         ->option_text("/POINTER=VALUE");
@@ -59,12 +60,14 @@ class Study : public Verb {
     VerbContext inner{own, context.program, context.progress, context.out};
     SweepOptions options;
     options.only = only_;
-    return run_sweep(inner, experiment, inner.output_folder(), options);
+    options.anew = anew_;
+    return run_sweep(inner, experiment, options);
   }
 
  private:
   std::string file_, output_, size_ = "quick";
   std::vector<std::string> only_, settings_;
+  bool anew_ = false;
 };
 
 }  // namespace

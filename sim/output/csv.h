@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -24,6 +25,11 @@ class CsvTable {
   void add_row(std::vector<CsvCell> cells);
   /// A row of numbers only.
   void add_numbers(const std::vector<double>& values);
+  /// Takes over rows that an earlier table of the same columns left in `text`, up to the first for which
+  /// `wanted` is false; numbers stay the same to the last digit. For tables of numbers. Throws InputError
+  /// naming `path` and the line when the header or the number of cells is another, or a cell is no number.
+  void restore(const std::string& text, const std::string& path,
+               const std::function<bool(const std::vector<double>&)>& wanted);
   size_t num_rows() const { return num_rows_; }
   const std::string& text() const { return text_; }  ///< header and rows, "\n" line ends
   /// Throws InputError naming the path.

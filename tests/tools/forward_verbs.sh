@@ -86,6 +86,8 @@ expect 0 1 '^  viscosity +left out: no layer relaxes$' check twin/case.json
 expect 0 1 '^  viscosity +yes' check twin/case.json --set /settings/1=/base/stiffness=3
 expect 0 1 '^  nodes +70 ' check twin/case.json --set /skin/layers/soft/order=1 --set /settings/2=/base/stiffness=3
 expect 2 1 '--set "/settings/4=/base/stiffness=3": got item 4 of /settings, expected an item below 3$' check twin/case.json --set /settings/4=/base/stiffness=3
+sed 's|/base/stiffness=2|/base/stifness=2|' twin/case.json >twin/wrong.json
+expect 2 any '^rhytid: error: twin/wrong.json:1: /settings/0: /base/stifness: got .*, nearest is "stiffness"$' check twin/wrong.json
 expect 2 1 "^rhytid: error: --output: got '/dev/null/x' .*, expected a folder that can be written$" simulate tiny.json -o /dev/null/x
 
 expect 0 any '^written to run_a: run.json, steps.csv' simulate tiny.json -o run_a "${small[@]}"
@@ -172,8 +174,15 @@ cat >experiment.json <<'EXPERIMENT'
   "variants": [{"name": "soft"}, {"name": "firm", "settings": ["/skin/layers/soft/youngs_modulus=60 kPa"]}]
 }
 EXPERIMENT
-expect 2 1 "^rhytid: error: --only: got 'no', expected one of soft, firm$" study sweep experiment.json -o sweep --only no
+expect 2 1 "^rhytid: error: --only: got 'no', expected one of soft, firm$" study sweep experiment.json -o sweep/a --only no
+[ ! -e sweep ] || fail "a refused sweep leaves a folder"
+for verb in check simulate; do
+  expect 2 1 '^rhytid: error: experiment.json: got an experiment, expected a scene or a case ' $verb experiment.json -o sweep
+done
 expect 0 any '^written to sweep: results.csv' study sweep experiment.json -o sweep --threads 1
 [ "$(wc -l <sweep/results.csv)" = 3 ] || fail "rows of sweep/results.csv"
+[ "$(ls sweep)" = "$(printf '%s\n' amplitude.svg crests.svg firm index.html profiles.svg results.csv results.md soft)" ] ||
+  fail "files of sweep: $(ls sweep)"
 expect 0 any 'firm: complete before, kept' study sweep experiment.json -o sweep --threads 1
+expect 0 any 'firm: starts$' study sweep experiment.json -o sweep --threads 1 --anew --only firm
 exit $((failures > 0))

@@ -1,6 +1,8 @@
 // Experiments: the bundled ones can be built at both sizes; what is refused; a sweep keeps what is finished.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -12,13 +14,16 @@
 #include "tests/support/paths.h"
 #include "tests/support/real_data.h"
 #include "tests/support/small_scenes.h"
+#include "tools/interrupt.h"
 #include "tools/study/sweep.h"
 #include "tools/study/variant_result.h"
 
 namespace rhytid::tools {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 namespace fs = std::filesystem;
 
 TEST(BundledExperiments, CanBeBuiltAtTheQuickSizeAndReadAtTheFullOne) {
@@ -34,8 +39,8 @@ TEST(BundledExperiments, CanBeBuiltAtTheQuickSizeAndReadAtTheFullOne) {
       const Experiment e = load_experiment(file, size);
       for (const Variant& v : e.variants) {
         SCOPED_TRACE(v.name);
-        std::vector<std::string> settings = v.settings;
-        if (needs_head && !head.empty()) settings.push_back("/skin/surface/file=" + head);
+        std::vector<Setting> settings = v.settings;
+        if (needs_head && !head.empty()) settings.push_back({"/skin/surface/file=" + head});
         const Scene scene = load_scene(e.scene, settings);
         if (size == StudySize::full || (needs_head && head.empty())) continue;
         const SceneModel built(scene);
@@ -53,6 +58,36 @@ TEST(BundledExperiments, CanBeBuiltAtTheQuickSizeAndReadAtTheFullOne) {
   EXPECT_GE(found, 6);
   // The others were built all the same.
   if (head.empty()) GTEST_SKIP() << why_no_real_file(kHeadFile);
+}
+
+/// Text that sends the process SIGINT as soon as it holds certain words.
+class StoppingText : public std::stringbuf {
+ public:
+  std::string stop_at;
+
+ protected:
+  int sync() override {
+    if (!stop_at.empty() && str().find(stop_at) != std::string::npos) stop_at.clear(), std::raise(SIGINT);
+    return 0;
+  }
+};
+
+/// The cells of a column.
+std::vector<std::string> column(const std::string& csv, const std::string& name) {
+  std::vector<std::string> cells;
+  std::istringstream lines(csv);
+  int wanted = -1;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream row(line);
+    int k = 0;
+    for (std::string cell; std::getline(row, cell, ','); ++k) {
+      if (cell == name)
+        wanted = k;
+      else if (k == wanted)
+        cells.push_back(cell);
+    }
+  }
+  return cells;
 }
 
 class StudyFolder : public testing::Test {
@@ -85,21 +120,37 @@ class StudyFolder : public testing::Test {
     return "";
   }
   /// Runs the sweep; what it said on stderr.
-  std::string sweep(const std::string& path, ExitCode expected,
-                    const std::vector<std::string>& settings = {}) {
+  std::string sweep(const std::string& path, ExitCode expected, const std::vector<std::string>& settings = {},
+                    const SweepOptions& sweep_options = {}) {
     const Experiment e = load_experiment(path, StudySize::quick);
-    std::ostringstream said, out;
+    StoppingText text;
+    text.stop_at = stop_at_;
+    std::ostream said(&text);
+    std::ostringstream out;
     Progress progress(ProgressStyle::plain_lines, said);
     CommonOptions options;
     options.settings = settings;
+    options.output = folder_ + "/out";
     const Program program{"rhytid", "test", {}, {}};
     VerbContext context{options, program, progress, out};
-    fs::create_directories(folder_ + "/out");
-    EXPECT_EQ(run_sweep(context, e, folder_ + "/out", {}), expected) << said.str();
-    return said.str();
+    const InterruptGuard guard;
+    EXPECT_EQ(run_sweep(context, e, sweep_options), expected) << text.str();
+    return text.str();
   }
+  /// What the sweep refuses to do.
+  std::string refusal(const std::string& path, const std::vector<std::string>& settings = {}) {
+    try {
+      sweep(path, ExitCode::bad_input, settings);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  std::string out(const std::string& file) const { return folder_ + "/out/" + file; }
+  std::string results() const { return read_file(out("results.csv")); }
 
   std::string folder_;
+  std::string stop_at_;  ///< Ctrl-C comes when the sweep says this
 };
 
 const std::string kTwo =
@@ -136,27 +187,150 @@ TEST_F(StudyFolder, FinishedVariantsAreKeptAndChangedOnesRunAgain) {
   EXPECT_NE(read_file(folder_ + "/out/results.csv"), table);
 }
 
-TEST_F(StudyFolder, AKilledVariantGoesOnWhereItWas) {
+TEST_F(StudyFolder, AStoppedVariantGoesOnWhereItWas) {
+  const std::string path = experiment(R"({"name": "one", "settings": ["/time/frames=3"]})");
+  sweep(path, ExitCode::ok);
+  const std::string wrinkles = read_file(out("one/wrinkles.csv")), steps = read_file(out("one/steps.csv"));
+  EXPECT_EQ(std::count(wrinkles.begin(), wrinkles.end(), '\n'), 5);  // header, frames 0 to 3
+  fs::remove_all(out(""));
+  stop_at_ = "simulate 1/3";
+  sweep(path, ExitCode::interrupted);
+  EXPECT_EQ(read_variant(out("one"))->status, "running");
+  EXPECT_LT(read_file(out("one/wrinkles.csv")).size(), wrinkles.size());
+  stop_at_ = "";
+  const std::string said = sweep(path, ExitCode::ok);
+  EXPECT_THAT(said, HasSubstr("one: goes on"));
+  EXPECT_THAT(said, HasSubstr("resumed after frame 1"));
+  EXPECT_EQ(read_file(out("one/wrinkles.csv")), wrinkles);
+  EXPECT_EQ(read_file(out("one/steps.csv")), steps);
+  EXPECT_EQ(read_variant(out("one"))->status, "complete");
+}
+
+TEST_F(StudyFolder, AStoppedVariantWithDamagedTablesStartsFromTheBeginning) {
+  const std::string path = experiment(R"({"name": "one", "settings": ["/time/frames=3"]})");
+  sweep(path, ExitCode::ok);
+  const std::string wrinkles = read_file(out("one/wrinkles.csv")), steps = read_file(out("one/steps.csv"));
+  const auto without_line = [](const std::string& text, int line) {
+    std::istringstream lines(text);
+    std::string kept;
+    int number = 0;
+    for (std::string one; std::getline(lines, one);)
+      if (number++ != line) kept += one + "\n";
+    return kept;
+  };
+  const auto damaged = [](std::string text) { return text.replace(text.rfind("\n3,") + 1, 1, "three"); };
+  const std::pair<const char*, std::string> damages[] = {{"wrinkles.csv", without_line(wrinkles, 2)},
+                                                         {"wrinkles.csv", without_line(wrinkles, 4)},
+                                                         {"wrinkles.csv", damaged(wrinkles)},
+                                                         {"wrinkles.csv", ""},
+                                                         {"steps.csv", without_line(steps, 2)},
+                                                         {"steps.csv", damaged(steps)},
+                                                         {"state.bin", "nothing"}};
+  for (const auto& [file, text] : damages) {
+    SCOPED_TRACE(std::string(file) + ": " + text);
+    VariantResult stopped = *read_variant(out("one"));
+    stopped.status = "running";
+    write_variant(out("one"), stopped);
+    write_file(out("one/") + file, text);
+    EXPECT_THAT(sweep(path, ExitCode::ok), HasSubstr("one: goes on"));
+    EXPECT_EQ(read_file(out("one/wrinkles.csv")), wrinkles);
+    EXPECT_EQ(read_file(out("one/steps.csv")), steps);
+    EXPECT_EQ(read_variant(out("one"))->status, "complete");
+  }
+}
+
+TEST_F(StudyFolder, ChangedFilesMakeAVariantRunAgainFinishedOrNot) {
+  const std::string map = folder_ + "/map.csv", path = experiment(R"({"name": "one", "settings": []})");
+  const std::vector<std::string> settings = {"/ligaments/map=" + map, "/ligaments/sources=null",
+                                             "/ligaments/diffusion_time=null", "/time/frames=3"};
+  const auto write_map = [&](const std::string& b) {
+    std::string text = "vertex,b\n";
+    for (int vertex = 0; vertex < 5 * 4; ++vertex) text += std::to_string(vertex) + "," + b + "\n";
+    write_file(map, text);
+  };
+  write_map("0.3");
+  sweep(path, ExitCode::ok, settings);
+  const std::string soft = results();
+  write_map("9");
+  EXPECT_THAT(sweep(path, ExitCode::ok, settings),
+              HasSubstr("one: starts anew, with other files than before"));
+  const std::string stiff = results();
+  EXPECT_NE(stiff, soft);
+  // The same while a variant is stopped.
+  stop_at_ = "simulate 1/3";
+  sweep(path, ExitCode::interrupted, settings, {.only = {}, .anew = true, .frames = {}});
+  stop_at_ = "";
+  write_map("0.3");
+  EXPECT_THAT(sweep(path, ExitCode::ok, settings), HasSubstr("one: starts"));
+  EXPECT_EQ(column(results(), "stored_energy_mJ"), column(soft, "stored_energy_mJ"));
+  EXPECT_NE(column(results(), "stored_energy_mJ"), column(stiff, "stored_energy_mJ"));
+}
+
+TEST_F(StudyFolder, AnotherProgramRunsAgainAndSoDoesAnew) {
   const std::string path = experiment(R"({"name": "one", "settings": []})");
   sweep(path, ExitCode::ok);
-  const std::string wrinkles = read_file(folder_ + "/out/one/wrinkles.csv"),
-                    steps = read_file(folder_ + "/out/one/steps.csv");
-  // As a kill after the last frame leaves it.
-  VariantResult killed = *read_variant(folder_ + "/out/one");
-  killed.status = "running";
-  killed.columns.clear();
-  write_variant(folder_ + "/out/one", killed);
-  EXPECT_THAT(sweep(path, ExitCode::ok), HasSubstr("one: goes on"));
-  EXPECT_EQ(read_file(folder_ + "/out/one/wrinkles.csv"), wrinkles);
-  EXPECT_EQ(read_file(folder_ + "/out/one/steps.csv"), steps);
-  EXPECT_EQ(read_variant(folder_ + "/out/one")->status, "complete");
+  EXPECT_THAT(sweep(path, ExitCode::ok, {}, {.only = {}, .anew = true, .frames = {}}),
+              HasSubstr("one: starts"));
+  VariantResult of_another = *read_variant(out("one"));
+  of_another.identity.program = "another";
+  write_variant(out("one"), of_another);
+  EXPECT_THAT(sweep(path, ExitCode::ok), HasSubstr("one: starts anew, with other program than before"));
+  EXPECT_THAT(sweep(path, ExitCode::ok), HasSubstr("one: complete before, kept"));
+}
+
+TEST_F(StudyFolder, TablesLeaveOutResultsOfOtherSettings) {
+  const std::string path = experiment(kTwo);
+  sweep(path, ExitCode::ok);
+  const SweepOptions only_soft{.only = {"soft"}, .anew = false, .frames = {}};
+  sweep(path, ExitCode::ok, {"/time/frames=1"}, only_soft);
+  EXPECT_THAT(results(), AllOf(HasSubstr("\nsoft,complete"), Not(HasSubstr("stiff"))));
+  for (const char* file : {"results.md", "index.html"})
+    EXPECT_NE(read_file(out(file)).find("Left out: stiff (finished with other settings)."),
+              std::string::npos);
+  // Back at the settings of stiff, it is soft that is out of date until it has run.
+  stop_at_ = "soft: starts anew";
+  sweep(path, ExitCode::interrupted);
+  EXPECT_THAT(results(), AllOf(HasSubstr("\nstiff,complete"), Not(HasSubstr("soft"))));
+  stop_at_ = "";
+  sweep(path, ExitCode::ok);
+  EXPECT_THAT(results(), AllOf(HasSubstr("\nstiff,complete"), HasSubstr("\nsoft,complete")));
+  EXPECT_THAT(read_file(out("results.md")), Not(HasSubstr("Left out")));
+}
+
+TEST_F(StudyFolder, NothingOfAnEarlierRunStaysInAVariant) {
+  const std::string path = experiment(R"({"name": "one", "settings": []})");
+  sweep(path, ExitCode::ok);
+  sweep(path, ExitCode::not_converged,
+        {"/solver/max_iterations=1", "/time/max_bisections=0", "/ligaments=null"});
+  for (const char* file : {"above.png", "ligaments.png"})
+    EXPECT_FALSE(fs::exists(out(std::string("one/") + file))) << file;
+  EXPECT_EQ(read_file(out("index.html")).find("<img"), std::string::npos);
+  // A folder that no sweep made is left alone.
+  fs::create_directories(out("two"));
+  write_file(out("two/profile.csv"), "mine");
+  EXPECT_THAT(refusal(experiment(R"({"name": "two"})")), HasSubstr("without the run.json of a run"));
+  EXPECT_EQ(read_file(out("two/profile.csv")), "mine");
+}
+
+TEST_F(StudyFolder, WhatIsWrongWithTheLastShowsBeforeTheFirstRuns) {
+  const std::string path =
+      experiment(R"({"name": "fine"}, {"name": "small", "settings": ["/skin/surface/grid/size=[10, 8]"]})");
+  EXPECT_THAT(refusal(path),
+              testing::MatchesRegex(".*experiment.json: variant small: /measure/line: got [0-9]+ "
+                                    "points beside the surface, expected .*"));
+  EXPECT_FALSE(fs::exists(out("")));
+  EXPECT_THAT(
+      refusal(experiment("{\"name\": \"fine\"},\n{\"name\": \"bad\", \"settings\": [\"/skin/ordr=2\"]}")),
+      HasSubstr("experiment.json:4: /variants/1/settings/0: /skin/ordr: got"));
+  EXPECT_THAT(refusal(experiment(R"({"name": "fine"})"), {"/skin/ordr=2"}),
+              HasSubstr("scene.json (--set): /skin/ordr: got"));
 }
 
 TEST_F(StudyFolder, ACheckpointOfAnotherVariantIsNotGoneOnFrom) {
   const std::string path = experiment(R"({"name": "one", "settings": []})");
   sweep(path, ExitCode::ok);
   // As a kill leaves it that comes while a changed variant is being set up.
-  write_variant(folder_ + "/out/one", {"one", "", "running", "", {}});
+  write_variant(folder_ + "/out/one", {"one", {}, "running", "", {}});
   EXPECT_THAT(sweep(path, ExitCode::ok, {"/time/frames=1", "/colliders/finger/radius=5.5 mm"}),
               HasSubstr("one: starts"));
   EXPECT_EQ(read_variant(folder_ + "/out/one")->status, "complete");
@@ -173,7 +347,11 @@ TEST_F(StudyFolder, AVariantThatDoesNotConvergeIsReportedAndTheOthersRun) {
 
 TEST_F(StudyFolder, ErrorsAreOneLineThatNamesTheKey) {
   EXPECT_THAT(error_of(R"({"name": "a", "settings": ["no pointer"]})", ""),
-              HasSubstr("expected /json/pointer=value"));
+              HasSubstr(": /variants/0/settings/0: got 'no pointer', expected /json/pointer=value"));
+  EXPECT_THAT(error_of(R"({"name": "results.csv"})", ""), HasSubstr("which is a file of the sweep"));
+  EXPECT_THAT(
+      error_of(R"({"name": "a"})", R"("window": {"centre": [0, 0, 0], "size": [9, 9], "spacing": 1e-5})"),
+      HasSubstr("/measure/window/spacing: got 1e-05, which are"));
   EXPECT_THAT(error_of(R"({"name": "a", "setings": []})", ""), HasSubstr("nearest is \"settings\""));
   EXPECT_THAT(error_of(R"({"name": "a b"})", ""), HasSubstr("letters, digits"));
   EXPECT_THAT(error_of(R"({"name": "a"}, {"name": "a"})", ""), HasSubstr("a second time"));

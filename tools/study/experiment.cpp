@@ -1,19 +1,25 @@
 #include "tools/study/experiment.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <filesystem>
 #include <set>
 
 #include "sim/core/error.h"
+#include "sim/output/text.h"
 #include "sim/scene/located_json.h"
 #include "sim/scene/schema.h"
 #include "sim/scene/validate.h"
+#include "tools/study/sweep_report.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
 namespace {
 
 using nlohmann::json;
+
+/// 500 in either direction; each takes some 200 bytes and is compared with its neighbours.
+constexpr int most_window_points = 250000;
 
 Rule settings_rule(const std::string& pointer, const std::string& doc) {
   return {.pointer = pointer, .type = RuleType::array, .fallback = json::array(), .doc = doc};
@@ -62,6 +68,9 @@ void check(const LocatedJson& located) {
             std::string::npos ||
         name.front() == '.')
       refuse(at, shown_json(name), "letters, digits, _ - + and dots");
+    const auto& files = sweep_files();
+    if (std::find(files.begin(), files.end(), name) != files.end())
+      refuse(at, shown_json(name) + ", which is a file of the sweep", "another name");
   }
   const json& measure = root["measure"];
   if (measure.contains("wavelengths") && measure["wavelengths"][0] >= measure["wavelengths"][1])
@@ -76,6 +85,13 @@ void check(const LocatedJson& located) {
              "two directions that span a plane");
     if (std::min(w["size"][0].get<double>(), w["size"][1].get<double>()) < 2 * w["spacing"].get<double>())
       refuse("/measure/window/size", shown_json(w["size"]), "at least twice the spacing");
+    const double spacing = w["spacing"];
+    const double points =
+        (1 + w["size"][0].get<double>() / spacing) * (1 + w["size"][1].get<double>() / spacing);
+    if (points > most_window_points)
+      refuse("/measure/window/spacing",
+             shown_json(w["spacing"]) + ", which are " + short_text(points) + " points",
+             "at most " + std::to_string(most_window_points));
   }
 }
 
@@ -206,14 +222,17 @@ Experiment load_experiment(const std::string& path, StudySize size) {
   if (e.name.empty()) e.name = std::filesystem::path(path).stem().string();
   e.measure = read_measure(root["measure"]);
   e.measure_json = root["measure"];
-  for (const json& v : root["variants"]) {
+  const std::string of_size = std::string("/") + name(size);
+  for (std::size_t i = 0; i < root["variants"].size(); ++i) {
+    const json& v = root["variants"][i];
     if (v["size"] != "both" && v["size"] != name(size)) continue;
     Variant variant;
     variant.name = v["name"];
-    for (const json* list : {&root["settings"], &root[name(size)], &v["settings"], &v[name(size)]})
-      for (const json& text : *list) {
-        check_setting(text.get<std::string>());
-        variant.settings.push_back(text);
+    const std::string at = "/variants/" + std::to_string(i);
+    for (const std::string& list : {std::string("/settings"), of_size, at + "/settings", at + of_size})
+      for (Setting& setting : settings_at(located, list)) {
+        check_setting(setting.text, setting.origin);
+        variant.settings.push_back(std::move(setting));
       }
     e.variants.push_back(std::move(variant));
   }

@@ -8,6 +8,7 @@
 
 #include "sim/output/surface_samples.h"
 #include "sim/output/wrinkles.h"
+#include "sim/scene/located_json.h"
 #include "sim/scene/rules.h"
 
 namespace rhytid::tools {
@@ -26,8 +27,7 @@ struct WrinkleMeasure {
 
 struct Variant {
   std::string name;
-  std::vector<std::string>
-      settings;  ///< of the experiment, its size, the variant and its size, in this order
+  std::vector<Setting> settings;  ///< of the experiment, its size, the variant and its size, in this order
 };
 
 struct Experiment {

@@ -1,15 +1,17 @@
 #include "tools/study/sweep.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
+#include <map>
 #include <ostream>
 
-#include "sim/core/build_info.h"
 #include "sim/core/digest.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "sim/scene/scene_model.h"
+#include "sim/time/model_digest.h"
+#include "sim/time/program_digest.h"
 #include "tools/forward_run.h"
 #include "tools/study/sweep_report.h"
 #include "tools/study/variant_result.h"
@@ -17,18 +19,6 @@
 
 namespace rhytid::tools {
 namespace {
-
-namespace fs = std::filesystem;
-
-/// What a variant's result depends on.
-std::string identity_of(const Scene& scene, const Experiment& experiment) {
-  Digest digest;
-  digest.text(build_info().version);
-  digest.text(scene_to_json(scene).dump());
-  digest.text(experiment.measure_json.dump());
-  if (!scene.skin.surface.file.empty()) digest.text(read_file(scene.skin.surface.file));
-  return digest.hex();
-}
 
 /// The largest resident memory since the last call, MB; 0 where the system does not tell.
 double take_peak_memory() {
@@ -42,17 +32,20 @@ double take_peak_memory() {
 
 class Sweep {
  public:
-  Sweep(VerbContext& context, const Experiment& experiment, std::string folder, const SweepOptions& options)
-      : context_(context), experiment_(experiment), folder_(std::move(folder)), options_(options) {}
+  Sweep(VerbContext& context, const Experiment& experiment, const SweepOptions& options)
+      : context_(context), experiment_(experiment), folder_(context.options.output), options_(options) {}
 
   ExitCode run() {
     for (const std::string& name : options_.only)
       if (std::none_of(experiment_.variants.begin(), experiment_.variants.end(),
                        [&](const Variant& v) { return v.name == name; }))
         throw InputError("--only", "'" + name + "'", "one of " + names());
-    // All scenes are read first: what is wrong with the last shows before the first runs.
+    // All models are built first: what is wrong with the last shows before the first runs.
     for (const Variant& v : experiment_.variants)
-      if (is_wanted(v)) load_scene(experiment_.scene, settings_of(v));
+      if (is_wanted(v)) identities_[v.name] = identity_of(v);
+    context_.output_folder();
+    for (const Variant& v : experiment_.variants)
+      if (!is_wanted(v)) identify_earlier(v);
     ExitCode worst = ExitCode::ok;
     for (const Variant& v : experiment_.variants) {
       if (!is_wanted(v)) continue;
@@ -63,6 +56,7 @@ class Sweep {
     }
     context_.out << "written to " << folder_
                  << ": results.csv, results.md, index.html, and a folder per variant\n";
+    if (const std::string text = left_out(); !text.empty()) context_.out << text << '\n';
     return worst;
   }
 
@@ -76,32 +70,66 @@ class Sweep {
     for (const Variant& v : experiment_.variants) text += (text.empty() ? "" : ", ") + v.name;
     return text;
   }
+  std::string folder_of(const Variant& v) const { return folder_ + "/" + v.name; }
   /// The command line has the last word.
-  std::vector<std::string> settings_of(const Variant& v) const {
-    std::vector<std::string> all = v.settings;
-    all.insert(all.end(), context_.options.settings.begin(), context_.options.settings.end());
+  std::vector<Setting> settings_of(const Variant& v) const {
+    std::vector<Setting> all = v.settings;
+    for (const std::string& text : context_.options.settings) all.push_back({text});
     return all;
+  }
+
+  /// What the variant's result depends on. Throws InputError when it cannot be run or measured.
+  VariantIdentity identity_of(const Variant& v) const {
+    try {
+      const SceneModel built(load_scene(experiment_.scene, settings_of(v)));
+      place_samples(built.model().mesh, experiment_.measure);
+      nlohmann::json scene = scene_to_json(built.scene());
+      scene.erase("description");
+      Digest of_scene, of_measure;
+      of_scene.text(scene.dump());
+      of_measure.text(experiment_.measure_json.dump());
+      return {of_scene.hex(), of_measure.hex(), content_digest(built.model()), program_digest()};
+    } catch (const InputError& error) {
+      const std::string text = error.what();  // a setting's place begins with the experiment
+      throw InputError(text.starts_with(experiment_.file + ":")
+                           ? text
+                           : experiment_.file + ": variant " + v.name + ": " + text);
+    }
+  }
+  /// Of a variant that is not asked for, if it has a result and can still be built.
+  void identify_earlier(const Variant& v) {
+    if (const auto earlier = read_variant(folder_of(v)); !earlier || !earlier->finished()) return;
+    try {
+      identities_[v.name] = identity_of(v);
+    } catch (const InputError& error) {
+      context_.progress.note(error.what());
+    }
   }
 
   ExitCode run(const Variant& v) {
     CommonOptions own = context_.options;
     own.file = experiment_.scene;
-    own.settings = settings_of(v);
-    own.output = folder_ + "/" + v.name;
+    own.settings.clear();
+    for (const Setting& setting : settings_of(v)) own.settings.push_back(setting.text);
+    own.output = folder_of(v);
     VerbContext context{own, context_.program, context_.progress, context_.out};
     context.output_folder();
-    const std::string identity = identity_of(load_scene(own.file, own.settings), experiment_);
+    VariantIdentity& identity = identities_.at(v.name);
     const std::optional<VariantResult> earlier = read_variant(own.output);
-    const bool is_same = earlier && earlier->identity == identity;
-    if (is_same && earlier->finished()) {
+    if (earlier && earlier->finished() && earlier->identity == identity && !options_.anew) {
       context_.progress.note(v.name + ": " + earlier->status + " before, kept");
       return earlier->status == "complete" ? ExitCode::ok : ExitCode::not_converged;
     }
-    context_.progress.note(v.name + (is_same ? ": goes on" : ": starts"));
+    identity = identity_of(v);  // files may have changed while others ran
+    const bool is_same = earlier && earlier->identity == identity && !options_.anew;
+    std::string why;
+    if (earlier && earlier->finished() && !options_.anew)
+      why = " anew, with other " + difference(identity, earlier->identity) + " than before";
+    context_.progress.note(v.name + (is_same ? ": goes on" : ": starts" + why));
     VariantResult result{v.name, identity, "running", "", {}};
     // Until its checkpoint is gone, what lies there is that of another variant, to which a kill must not lead
     // back.
-    if (!is_same) write_variant(own.output, {v.name, "", "running", "", {}});
+    if (!is_same) write_variant(own.output, {v.name, {}, "running", "", {}});
     take_peak_memory();
     WrinkleRecorder recorder(experiment_.measure, [&] { write_variant(own.output, result); });
     const ExitCode code = run_forward(context, options_.frames, is_same, &recorder);
@@ -115,26 +143,49 @@ class Sweep {
     return code;
   }
 
-  /// Tables and page of all variants that are finished, also in earlier runs.
+  /// The result of a variant as it is asked for now, also from an earlier run; why there is none.
+  std::optional<VariantResult> current(const Variant& v, std::string& reason) const {
+    auto result = read_variant(folder_of(v));
+    const auto identity = identities_.find(v.name);
+    if (!result || !result->finished()) {
+      reason = "not finished";
+    } else if (identity == identities_.end()) {
+      reason = "cannot be built any more";
+    } else if (result->identity == identity->second) {
+      return result;
+    } else {
+      reason = "finished with other " + difference(identity->second, result->identity);
+    }
+    return std::nullopt;
+  }
+
+  /// A sentence on the variants without a result; empty when all have one.
+  std::string left_out() const {
+    std::string text, reason;
+    for (const Variant& v : experiment_.variants)
+      if (!current(v, reason)) text += (text.empty() ? "Left out: " : ", ") + v.name + " (" + reason + ")";
+    return text.empty() ? text : text + ".";
+  }
+
   void report() const {
     std::vector<VariantResult> results;
+    std::string reason;
     for (const Variant& v : experiment_.variants)
-      if (auto result = read_variant(folder_ + "/" + v.name); result && result->finished())
-        results.push_back(std::move(*result));
-    write_sweep_report(folder_, experiment_, results);
+      if (auto result = current(v, reason)) results.push_back(std::move(*result));
+    write_sweep_report(folder_, experiment_, results, left_out());
   }
 
   VerbContext& context_;
   const Experiment& experiment_;
   std::string folder_;
   const SweepOptions& options_;
+  std::map<std::string, VariantIdentity> identities_;  ///< by name, of variants that can be built
 };
 
 }  // namespace
 
-ExitCode run_sweep(VerbContext& context, const Experiment& experiment, const std::string& folder,
-                   const SweepOptions& options) {
-  return Sweep(context, experiment, folder, options).run();
+ExitCode run_sweep(VerbContext& context, const Experiment& experiment, const SweepOptions& options) {
+  return Sweep(context, experiment, options).run();
 }
 
 }  // namespace rhytid::tools

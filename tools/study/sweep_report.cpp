@@ -68,8 +68,10 @@ void write_csv(const std::string& path, const std::vector<ResultColumn>& columns
 
 /// Variants are columns: there are few of them and many numbers.
 std::string markdown(const Experiment& experiment, const std::vector<ResultColumn>& columns,
-                     const std::vector<VariantResult>& results) {
-  std::string text = "# " + experiment.name + "\n\n" + experiment.description + "\n\n|  |";
+                     const std::vector<VariantResult>& results, const std::string& left_out) {
+  std::string text = "# " + experiment.name + "\n\n" + experiment.description + "\n\n";
+  if (!left_out.empty()) text += left_out + "\n\n";
+  text += "|  |";
   for (const VariantResult& r : results) text += " " + r.name + " |";
   text += "\n| --- |";
   for (std::size_t i = 0; i < results.size(); ++i) text += " ---: |";
@@ -118,7 +120,9 @@ std::vector<PlotSeries> series(const std::string& folder, const std::vector<Vari
   return all;
 }
 
-void add_plot(HtmlPage& page, const std::string& folder, const std::string& name, LinePlot plot) {
+void add_plot(HtmlPage& page, const std::string& folder, const std::string& name, const LinePlot& plot) {
+  std::error_code ignored;  // of an earlier report, about something else
+  if (plot.series.empty()) fs::remove(folder + "/" + name, ignored);
   if (plot.series.empty()) return;
   const std::string drawn = svg(plot);
   write_file(folder + "/" + name, drawn);
@@ -161,14 +165,21 @@ void add_pictures(HtmlPage& page, const std::string& folder, const VariantResult
 
 }  // namespace
 
+const std::vector<std::string>& sweep_files() {
+  static const std::vector<std::string> files = {"results.csv",  "results.md",    "index.html",
+                                                 "profiles.svg", "amplitude.svg", "crests.svg"};
+  return files;
+}
+
 void write_sweep_report(const std::string& folder, const Experiment& experiment,
-                        const std::vector<VariantResult>& results) {
+                        const std::vector<VariantResult>& results, const std::string& left_out) {
   const std::vector<ResultColumn> columns = all_columns(results);
   write_csv(folder + "/results.csv", columns, results);
-  write_file(folder + "/results.md", markdown(experiment, columns, results));
+  write_file(folder + "/results.md", markdown(experiment, columns, results, left_out));
 
   HtmlPage page(experiment.name, experiment.description);
   page.section("results", "Results");
+  if (!left_out.empty()) page.paragraph(left_out);
   page.table(html_table(columns, results));
   page.section("profiles", "Profiles");
   add_plot(page, folder, "profiles.svg",

@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <numeric>
 #include <sstream>
 
+#include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
+#include "sim/core/parse_number.h"
 #include "sim/output/atomic_file.h"
+#include "sim/scene/located_json.h"
 
 namespace rhytid::tools {
 namespace {
@@ -41,20 +43,31 @@ std::optional<double> number_at(const json& j, const std::string& pointer) {
 
 }  // namespace
 
+std::string difference(const VariantIdentity& now, const VariantIdentity& then) {
+  // In this order: another scene is another model, whatever the files.
+  if (now.scene != then.scene) return "settings";
+  if (now.measure != then.measure) return "measure";
+  if (now.files != then.files) return "files";
+  return now.program != then.program ? "program" : "";
+}
+
 NumberTable read_number_table(const std::string& path) {
   std::istringstream lines(read_file(path));
-  std::string line;
   NumberTable table;
-  if (!std::getline(lines, line)) throw InputError(path + ": empty");
-  std::istringstream header(line);
-  for (std::string cell; std::getline(header, cell, ',');) table.push_back({cell, {}});
-  while (std::getline(lines, line)) {
-    std::istringstream row(line);
-    std::size_t k = 0;
-    for (std::string cell; std::getline(row, cell, ',') && k < table.size(); ++k)
-      table[k].second.push_back(std::strtod(cell.c_str(), nullptr));
-    if (k != table.size()) throw InputError(path + ": a row with " + std::to_string(k) + " cells");
-  }
+  for_csv_lines(lines, path, [&table](const CsvLine& line) {
+    if (table.empty()) {
+      for (const std::string& cell : line.cells) table.push_back({cell, {}});
+      return;
+    }
+    require_cells_as_in_header(line, table.size());
+    for (std::size_t k = 0; k < table.size(); ++k) {
+      double value = 0;
+      if (!parse(line.cells[k], value))
+        throw InputError(line.place, shown_json(line.cells[k]), "a number for " + table[k].first);
+      table[k].second.push_back(value);
+    }
+  });
+  if (table.empty()) throw InputError(path + ": empty");
   return table;
 }
 
@@ -65,8 +78,9 @@ std::optional<VariantResult> read_variant(const std::string& folder) {
   if (!j.is_object() || !j.contains("columns")) return std::nullopt;
   VariantResult r;
   try {
-    r.name = j.at("name"), r.identity = j.at("identity"), r.status = j.at("status"),
-    r.reason = j.at("reason");
+    r.name = j.at("name"), r.status = j.at("status"), r.reason = j.at("reason");
+    const json& identity = j.at("identity");
+    r.identity = {identity.at("scene"), identity.at("measure"), identity.at("files"), identity.at("program")};
     for (const json& c : j.at("columns")) {
       ResultColumn column{c.at("name"), c.at("unit"), std::nullopt};
       if (c.at("value").is_number()) column.value = c.at("value").get<double>();
@@ -80,7 +94,11 @@ std::optional<VariantResult> read_variant(const std::string& folder) {
 
 void write_variant(const std::string& folder, const VariantResult& result) {
   ordered_json j = {{"name", result.name},
-                    {"identity", result.identity},
+                    {"identity",
+                     {{"scene", result.identity.scene},
+                      {"measure", result.identity.measure},
+                      {"files", result.identity.files},
+                      {"program", result.identity.program}}},
                     {"status", result.status},
                     {"reason", result.reason},
                     {"columns", ordered_json::array()}};

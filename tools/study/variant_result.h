@@ -15,11 +15,23 @@ struct ResultColumn {
   std::optional<double> value;
 };
 
+/// Digests of what a result depends on; another one means another result.
+struct VariantIdentity {
+  std::string scene;    ///< after defaults, with all settings
+  std::string measure;  ///< where wrinkles are measured
+  std::string files;    ///< contents of what the scene names: mesh, maps, lists, points
+  std::string program;  ///< this build
+  bool operator==(const VariantIdentity&) const = default;
+};
+
+/// What of `now` is not as it was `then`, "settings", "measure", "files" or "program"; empty when all is.
+std::string difference(const VariantIdentity& now, const VariantIdentity& then);
+
 struct VariantResult {
   std::string name;
-  std::string identity;  ///< of scene, files, measure and program; another one means another variant
-  std::string status;    ///< running | complete | not_converged
-  std::string reason;    ///< a sentence when not complete
+  VariantIdentity identity;
+  std::string status;  ///< running | complete | not_converged
+  std::string reason;  ///< a sentence when not complete
   std::vector<ResultColumn> columns;
 
   bool finished() const { return status == "complete" || status == "not_converged"; }
@@ -34,7 +46,8 @@ void write_variant(const std::string& folder, const VariantResult& result);
 /// and last values of steps.csv, last row of wrinkles.csv.
 std::vector<ResultColumn> read_results(const std::string& folder);
 
-/// A CSV of numbers as columns, in its own order. Throws InputError naming the path.
+/// A CSV of numbers (nan and inf among them) as columns, in its own order. Throws InputError naming the line
+/// for anything else.
 std::vector<std::pair<std::string, std::vector<double>>> read_number_table(const std::string& path);
 
 }  // namespace rhytid::tools

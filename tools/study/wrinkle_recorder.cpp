@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/output/picture.h"
+#include "sim/output/text.h"
 
 namespace rhytid::tools {
 namespace {
@@ -65,18 +65,31 @@ PictureOptions from_above(const SubdividedSurface& outer) {
 
 }  // namespace
 
+WrinkleSamples place_samples(const SkinMesh& mesh, const WrinkleMeasure& measure) {
+  WrinkleSamples samples;
+  if (measure.line) {
+    const auto& line = samples.line.emplace(mesh, *measure.line, measure.line_points);
+    if (line.missing() > 0)
+      throw InputError("/measure/line", std::to_string(line.missing()) + " points beside the surface",
+                       "a line on the surface of the scene");
+  }
+  if (measure.window) {
+    const auto& window = samples.window.emplace(mesh, *measure.window, measure.window_spacing);
+    if (2 * window.missing() > window.rows() * window.columns())
+      throw InputError("/measure/window", "most points beside the surface",
+                       "a window on the surface of the scene");
+  }
+  return samples;
+}
+
+std::vector<std::string> WrinkleRecorder::files() const {
+  return {"wrinkles.csv", "profile.csv", "above.png", "ligaments.png"};
+}
+
 void WrinkleRecorder::begin(const SceneModel& scene_model, const std::string& folder) {
   scene_model_ = &scene_model;
   folder_ = folder;
-  const SkinMesh& mesh = scene_model.model().mesh;
-  if (measure_.line) line_.emplace(mesh, *measure_.line, measure_.line_points);
-  if (line_ && line_->missing() > 0)
-    throw InputError("/measure/line", std::to_string(line_->missing()) + " points beside the surface",
-                     "a line on the surface of the scene");
-  if (measure_.window) window_.emplace(mesh, *measure_.window, measure_.window_spacing);
-  if (window_ && 2 * window_->missing() > window_->rows() * window_->columns())
-    throw InputError("/measure/window", "most points beside the surface",
-                     "a window on the surface of the scene");
+  samples_ = place_samples(scene_model.model().mesh, measure_);
   table_.emplace(columns(measure_));
 }
 
@@ -88,18 +101,20 @@ void WrinkleRecorder::start(const State& rest) {
 
 void WrinkleRecorder::resume(int last_frame) {
   const std::string path = folder_ + "/wrinkles.csv";
-  std::istringstream lines(read_file(path));
-  std::string line;
-  if (!std::getline(lines, line) || line + "\n" != table_->text())
-    throw InputError(path, "a table with other columns", "the wrinkles.csv that the run wrote");
-  while (std::getline(lines, line)) {
-    // Numbers only: kept as text they come back unchanged.
-    std::vector<CsvCell> cells;
-    std::istringstream row(line);
-    for (std::string cell; std::getline(row, cell, ',');) cells.emplace_back(cell);
-    if (cells.empty() || std::stoi(std::get<std::string>(cells[0])) > last_frame) break;
-    table_->add_row(std::move(cells));
-  }
+  const auto refuse = [&path](const std::string& found) {
+    throw InputError(path, found, "a row for every frame");
+  };
+  CsvTable earlier = *table_;
+  int next = 0;  // frames are whole and come in order, from 0
+  earlier.restore(read_file(path), path, [&](const std::vector<double>& row) {
+    if (row[0] > last_frame) return false;
+    if (row[0] != next)
+      refuse("frame " + short_text(row[0]) + " where " + std::to_string(next) + " should be");
+    ++next;
+    return true;
+  });
+  if (next <= last_frame) refuse("no frame " + std::to_string(next));
+  table_ = std::move(earlier);
 }
 
 void WrinkleRecorder::frame(int frame, const State& state) {
@@ -107,22 +122,23 @@ void WrinkleRecorder::frame(int frame, const State& state) {
   const auto add = [&row](const WrinkleDescriptors& d) {
     for (const double value : {d.amplitude, d.wavelength, d.extent}) row.push_back(value);
   };
-  if (line_) {
-    const VectorXd heights = line_->heights(state.u).col(0);
-    const VectorXd wrinkles = band_pass(heights, line_->spacing(), measure_.band);
-    const WrinkleCount count = count_wrinkles(wrinkles, line_->spacing());
+  if (samples_.line) {
+    const VectorXd heights = samples_.line->heights(state.u).col(0);
+    const VectorXd wrinkles = band_pass(heights, samples_.line->spacing(), measure_.band);
+    const WrinkleCount count = count_wrinkles(wrinkles, samples_.line->spacing());
     for (const double value :
          {double(count.crests), double(count.sign_changes), count.crest_spacing, count.largest})
       row.push_back(value);
-    add(describe(wrinkle_sums(wrinkles, line_->spacing())));
+    add(describe(wrinkle_sums(wrinkles, samples_.line->spacing())));
     CsvTable profile({{"place", "mm"}, {"height", "mm"}, {"wrinkles", "mm"}});
     for (Eigen::Index i = 0; i < heights.size(); ++i)
-      profile.add_numbers({static_cast<double>(i) * line_->spacing(), heights[i], wrinkles[i]});
+      profile.add_numbers({static_cast<double>(i) * samples_.line->spacing(), heights[i], wrinkles[i]});
     profile.write(folder_ + "/profile.csv");
   }
-  if (window_) {
-    const MatrixXd wrinkles = band_pass(window_->heights(state.u), window_->spacing(), measure_.band);
-    const WrinkleDescriptors d = describe(wrinkle_sums(wrinkles, window_->spacing()));
+  if (samples_.window) {
+    const MatrixXd wrinkles =
+        band_pass(samples_.window->heights(state.u), samples_.window->spacing(), measure_.band);
+    const WrinkleDescriptors d = describe(wrinkle_sums(wrinkles, samples_.window->spacing()));
     add(d);
     row.push_back(d.direction * 180 / std::numbers::pi);
     row.push_back(d.coherence);
