@@ -1,7 +1,7 @@
 #!/bin/bash
 # The scripts of tools/ on a copy of them: --help prints and does nothing else, what they do not know is refused before
-# anything is done, packages that cannot be installed are named, a demo that is finished is not done again, and skipped
-# tests are counted.
+# anything is done, packages that cannot be installed are named, a demo that is finished is not done again, skipped
+# tests are counted, and ctest need not be there before the first build.
 #   scripts.sh SOURCE_FOLDER SCRATCH_FOLDER
 set -u
 source=$1 scratch=$2
@@ -145,4 +145,18 @@ LC_ALL=C PATH=$scratch/bin:$PATH tools/test >out.txt 2>&1
 echo '100% tests passed, 0 tests failed out of 5' >ctest_prints.txt
 PATH=$scratch/bin:$PATH tools/test >out.txt 2>&1
 [ "$(tail -1 out.txt)" = "Skipped none of 5 tests" ] || fail "no skipped tests: $(cat out.txt)"
+
+# On a system without ctest, which comes with the build, its options are known all the same.
+for command in nproc tee sort uniq paste mv; do ln -s "$(command -v $command)" bin; done
+stand_in ctest.to_come <<'STAND_IN'
+#!/bin/bash
+[ "$*" = --help ] && echo "  -L <regex>, --label-regex <regex> = Run tests with labels" || cat ctest_prints.txt
+STAND_IN
+printf '#!/bin/bash\n[ ! -e bin/ctest.to_come ] || mv bin/ctest.to_come bin/ctest\n' >tools/build
+rm bin/ctest
+PATH=$scratch/bin tools/test -L hygiene >out.txt 2>&1 || fail "the first tests of a system: $(cat out.txt)"
+[ "$(cat out.txt)" = "$(cat ctest_prints.txt; echo "Skipped none of 5 tests")" ] || fail "first tests: $(cat out.txt)"
+mv bin/ctest bin/ctest.to_come
+PATH=$scratch/bin tools/test --no-such-option >out.txt 2>&1
+[ $? = 2 ] && grep -q "got '--no-such-option'" out.txt || fail "an unknown option before ctest came: $(cat out.txt)"
 exit $((failures > 0))
