@@ -93,17 +93,34 @@ double mean_of_given(const std::vector<double>& values) {
 
 VectorXd on_surface_vertices(const TriangleSurface& surface, const std::vector<double>& by_file_vertex,
                              const std::string& where) {
-  VectorXd values(surface.vertices.rows());
-  for (Eigen::Index v = 0; v < values.size(); ++v) {
-    const int source = surface.source_vertex.empty() ? static_cast<int>(v)
-                                                     : surface.source_vertex[static_cast<std::size_t>(v)];
-    const bool is_given = static_cast<std::size_t>(source) < by_file_vertex.size() &&
-                          !std::isnan(by_file_vertex[static_cast<std::size_t>(source)]);
-    if (!is_given)
-      throw InputError(where, "no value for vertex " + std::to_string(source),
-                       "a value for every vertex of the patch");
-    values[v] = by_file_vertex[static_cast<std::size_t>(source)];
+  // The patch's own numbers; its vertices are at most those of the file.
+  std::vector<int> patch_vertex;
+  for (int v = 0; v < static_cast<int>(surface.vertices.rows()); ++v) {
+    const auto source = static_cast<std::size_t>(surface.source_of_vertex(v));
+    if (source >= patch_vertex.size()) patch_vertex.resize(source + 1, -1);
+    patch_vertex[source] = v;
   }
+  VectorXd values(surface.vertices.rows());
+  std::vector<int> giver(static_cast<std::size_t>(values.size()), -1);  // vertex of the file
+  for (int given = 0; given < static_cast<int>(by_file_vertex.size()); ++given) {
+    const double value = by_file_vertex[static_cast<std::size_t>(given)];
+    // Of vertices that were joined any may have the value.
+    const auto source = static_cast<std::size_t>(surface.standing_for(given));
+    if (std::isnan(value) || source >= patch_vertex.size() || patch_vertex[source] < 0) continue;
+    const int v = patch_vertex[source];
+    int& first = giver[static_cast<std::size_t>(v)];
+    if (first >= 0 && std::fabs(value - values[v]) > 1e-9 * values[v])
+      throw InputError(where,
+                       std::to_string(values[v]) + " at vertex " + std::to_string(first) + " and " +
+                           std::to_string(value) + " at vertex " + std::to_string(given) +
+                           ", which are joined",
+                       "one value for both");
+    if (first < 0) first = given, values[v] = value;
+  }
+  for (int v = 0; v < static_cast<int>(values.size()); ++v)
+    if (giver[static_cast<std::size_t>(v)] < 0)
+      throw InputError(where, "no value for vertex " + std::to_string(surface.source_of_vertex(v)),
+                       "a value for every vertex of the patch");
   return values;
 }
 

@@ -20,8 +20,9 @@ std::vector<double> read_vertex_values(const std::string& path, const std::strin
 /// Mean of the values that are not NaN.
 double mean_of_given(const std::vector<double>& values);
 
-/// Values at the vertices of a (cropped) surface from values by vertex of the file it came from. Throws
-/// InputError naming `where` and the first vertex without a value.
+/// Values at the vertices of a (cropped) surface from values by vertex of the file it came from; of vertices
+/// that were joined any may have the value. Throws InputError naming `where` and the first vertex without a
+/// value, or two joined ones whose values differ.
 VectorXd on_surface_vertices(const TriangleSurface& surface, const std::vector<double>& by_file_vertex,
                              const std::string& where);
 

@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <limits>
 
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
 #include "sim/scene/scene_surface.h"
+#include "sim/scene/vertex_values.h"
 
 namespace rhytid {
 namespace {
@@ -108,6 +110,38 @@ TEST(SceneSurface, RefusesAnOpenSeamUnlessTold) {
               AllOf(HasSubstr("2 vertices lie exactly on another one"), HasSubstr("vertex 11 on vertex 4")));
   EXPECT_EQ(surface_of(R"({"file": ")" + seam + R"(", "coincident": "join"})").vertices.rows(), 10);
   EXPECT_EQ(surface_of(R"({"file": ")" + seam + R"(", "coincident": "keep"})").vertices.rows(), 12);
+}
+
+TEST(SceneSurface, ValuesPerVertexMayNameEitherOfTwoJoinedVertices) {
+  const std::string seam =
+      write("mapped.obj", grid_obj(2, 50) + "v 100 0 0\nv 100 50 0\nv 150 0 0\nf 11 13 12\n");
+  const TriangleSurface joined = surface_of(R"({"file": ")" + seam + R"(", "coincident": "join"})");
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const auto on_vertices = [&](std::vector<double> values) {
+    return on_surface_vertices(joined, values, "a.json: /map");
+  };
+  // From 0, vertex 10 lies on 3 and 11 on 6; no face uses vertex 0.
+  const VectorXd expected = on_vertices({none, 1, 2, 30, 4, 5, 60, 7, 8, 9, none, none, 12});
+  EXPECT_EQ(expected, on_vertices({none, 1, 2, none, 4, 5, 60, 7, 8, 9, 30, none, 12}));
+  EXPECT_EQ(expected, on_vertices({none, 1, 2, 30, 4, 5, 60, 7, 8, 9, 30, 60, 12}));
+  EXPECT_EQ(expected[2], 30);
+  EXPECT_THAT(refusal([&] {
+                on_vertices({none, 1, 2, 30, 4, 5, 60, 7, 8, 9, 30, 61, 12});
+              }),
+              HasSubstr("got 60.000000 at vertex 6 and 61.000000 at vertex 11, which are joined"));
+  EXPECT_THAT(refusal([&] {
+                on_vertices({none, 1, 2, 30, 4, 5, none, 7, 8, 9, 30, none, 12});
+              }),
+              HasSubstr("no value for vertex 6"));
+  // What is not in the patch may say what it likes.
+  const TriangleSurface part =
+      surface_of(R"({"file": ")" + seam + R"(", "coincident": "join", "crop": {"vertices": [1, 2, 4, 5]}})");
+  EXPECT_EQ(on_surface_vertices(part, {none, 1, 2, 30, 4, 5, 60, 7, 8, 9, 31, 61, 12}, "").size(), 4);
+}
+
+TEST(SceneSurface, RefusesMoreFacesThanCanBeCounted) {
+  EXPECT_THAT(refusal([] { surface_of(R"({"grid": {"size": [100, 100], "cells": [8000, 5000]}})"); }),
+              HasSubstr("/skin/surface/grid/cells: got 80000000 faces, expected at most 33554431"));
 }
 
 TEST(SceneSurface, ListsMayNameEitherOfTwoJoinedVertices) {
