@@ -198,6 +198,10 @@ SkinMesh extrude(const TriangleSurface& surface, const ExtrusionOptions& options
   mesh.face_columns = std::move(columns.face_columns);
   const std::vector<VectorXd> heights = stack_layers(options, thickness, mesh);
   mesh.num_levels = static_cast<int>(heights.size());
+  const long unknowns = 3L * mesh.num_columns * mesh.num_levels;
+  if (unknowns > std::numeric_limits<int>::max())
+    throw InputError(surface.origin, std::to_string(unknowns) + " components of displacement",
+                     "at most " + std::to_string(std::numeric_limits<int>::max()));
   mesh.rest.resize(mesh.num_nodes(), 3);
   for (int column = 0; column < mesh.num_columns; ++column) {
     const double given = options.surface_is_outer ? heights.back()[column] : 0;

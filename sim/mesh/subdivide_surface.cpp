@@ -63,6 +63,12 @@ TriangleSurface subdivided_once(const TriangleSurface& coarse) {
 TriangleSurface subdivide_surface(const TriangleSurface& surface, int passes) {
   require(passes >= 0 && passes <= 6, "subdivide_surface: 0 to 6 passes");
   if (passes == 0) return surface;
+  const long most = static_cast<long>(surface.faces.size()) << (2 * passes);
+  if (most > kMostFaces)
+    throw InputError(surface.origin,
+                     std::to_string(surface.faces.size()) + " faces to subdivide " + std::to_string(passes) +
+                         " times into " + std::to_string(most),
+                     "at most " + std::to_string(kMostFaces) + " in the end");
   validate_surface(surface);
   TriangleSurface fine = surface;
   for (int pass = 0; pass < passes; ++pass) fine = subdivided_once(fine);

@@ -49,8 +49,8 @@ TriangleSurface SurfaceBuilder::finish(const std::string& format) {
   const long count = num_vertices();
   if (count == 0) throw InputError(path_ + ": no vertices; is it a mesh in " + format + " format?");
   if (triangles_.empty()) throw InputError(path_ + ": no faces");
-  if (std::max<std::size_t>(vertices_.size(), triangles_.size()) > std::numeric_limits<int>::max() / 64)
-    throw InputError(path_ + ": more than " + std::to_string(std::numeric_limits<int>::max() / 64) +
+  if (std::max<std::size_t>(vertices_.size(), triangles_.size()) > kMostFaces)
+    throw InputError(path_ + ": more than " + std::to_string(kMostFaces) +
                      " vertices or faces; crop or coarsen the mesh");
   TriangleSurface surface;
   surface.origin = path_;

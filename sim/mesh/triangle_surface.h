@@ -2,12 +2,16 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "sim/core/types.h"
 
 namespace rhytid {
+
+/// Surfaces have no more faces and vertices than this, so that what is counted of their elements fits an int.
+inline constexpr int kMostFaces = std::numeric_limits<int>::max() / 64;
 
 /// A triangle mesh in mm. Vertex order is the file's (cropping keeps the order of what remains).
 struct TriangleSurface {
@@ -109,10 +113,11 @@ TriangleSurface crop_box(const TriangleSurface& surface, const Vec3& low, const 
 TriangleSurface crop_vertices(const TriangleSurface& surface, const std::vector<int>& indices,
                               const std::string& list_origin);
 
-/// Loop subdivision: every pass splits each face into four and smooths; the rim becomes a cubic spline
-/// through its own vertices. New vertices and faces count as copies of their coarse ones in messages. Throws
-/// what validate_surface throws. Source  C. Loop 1987, with the vertex weights of J. Warren (3/16 for valence
-/// 3, else 3/8n).
+/// Loop subdivision: every pass splits each face into four and smooths; the rim becomes the cubic B-spline
+/// that has its vertices as control points (weights 1/8, 3/4, 1/8), so that its corners are rounded off. New
+/// vertices and faces count as copies of their coarse ones in messages. Throws what validate_surface throws,
+/// and InputError where there would be more than kMostFaces faces. Source  C. Loop 1987, with the vertex
+/// weights of J. Warren (3/16 for valence 3, else 3/8n).
 TriangleSurface subdivide_surface(const TriangleSurface& surface, int passes);
 
 /// Refuses what the simulator cannot extrude: no faces, index out of range, degenerate or duplicate faces,

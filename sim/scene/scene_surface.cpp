@@ -53,9 +53,14 @@ std::vector<int> read_vertex_list(const std::string& path) {
 }
 
 TriangleSurface scene_surface(const SurfaceScene& s) {
-  if (s.file.empty())
+  if (s.file.empty()) {
+    const long faces = 2L * s.grid_cells[0] * s.grid_cells[1];
+    if (faces > kMostFaces)
+      throw InputError("/skin/surface/grid/cells", std::to_string(faces) + " faces",
+                       "at most " + std::to_string(kMostFaces));
     return grid_surface(s.grid_size[0], s.grid_size[1], s.grid_cells[0], s.grid_cells[1],
                         grid_pattern(s.grid_pattern));
+  }
   TriangleSurface mesh = read_surface(s.file, s.mm_per_unit > 0 ? s.mm_per_unit : 1);
   drop_unused_vertices(mesh);
   if (s.mm_per_unit == 0) refuse_doubtful_unit(mesh);

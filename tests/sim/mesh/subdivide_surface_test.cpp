@@ -1,4 +1,5 @@
 // Loop subdivision: counts, places, planes stay planes, edges become smooth.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -66,6 +67,28 @@ TEST(Subdivide, AFlatGridStaysFlatAndItsStraightRimsStraight) {
   // Corners are rounded, straight sides are not: their extreme coordinate stays.
   EXPECT_NEAR(fine.vertices.col(0).maxCoeff(), 6, 1e-12);
   EXPECT_NEAR(fine.vertices.col(1).minCoeff(), -4, 1e-12);
+}
+
+TEST(Subdivide, TheRimIsACubicBSplineOfItsVertices) {
+  const TriangleSurface grid = grid_surface(12, 8, 3, 2, GridPattern::union_jack);
+  const TriangleSurface fine = subdivide_surface(grid, 1);
+  const int corner = static_cast<int>(grid.vertices.rows()) - 1;
+  ASSERT_EQ(Vec3(grid.vertices.row(corner)), Vec3(6, 4, 0));
+  // 3/4 of itself, 1/8 of its neighbours on the rim, (2, 4) and (6, 0).
+  EXPECT_LT((Vec3(fine.vertices.row(corner)) - Vec3(5.5, 3.5, 0)).norm(), 1e-12);
+  // New vertices of the rim lie half way, whatever is opposite.
+  double nearest = 1e300;
+  for (Eigen::Index v = grid.vertices.rows(); v < fine.vertices.rows(); ++v)
+    nearest = std::min(nearest, (Vec3(fine.vertices.row(v)) - Vec3(4, 4, 0)).norm());
+  EXPECT_LT(nearest, 1e-12);
+}
+
+// 7200 faces become 29 million in six passes and 8450 would become 35 million, before anything is allocated.
+TEST(Subdivide, RefusesMoreFacesThanCanBeCounted) {
+  const TriangleSurface grid = grid_surface(130, 130, 65, 65, GridPattern::union_jack);
+  EXPECT_THAT(
+      testing_support::input_error([&] { subdivide_surface(grid, 6); }),
+      testing::HasSubstr("got 8450 faces to subdivide 6 times into 34611200, expected at most 33554431"));
 }
 
 TEST(Subdivide, RefusesWhatCannotBeExtrudedAnyway) {
