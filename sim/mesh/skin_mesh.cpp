@@ -40,11 +40,13 @@ std::vector<int> SkinMesh::outer_nodes(int face) const {
 void add_imperfection(SkinMesh& mesh, double amplitude, int seed) {
   require(amplitude >= 0, "add_imperfection: the amplitude must not be negative");
   std::mt19937 random(static_cast<unsigned>(seed));
+  if (mesh.imperfection.size() == 0) mesh.imperfection = VectorXd::Zero(mesh.num_columns);
   for (int column = 0; column < mesh.num_columns; ++column) {
     // Distributions of the standard library differ between its makers.
     const double uniform = 2 * (static_cast<double>(random()) / 4294967295.) - 1;
     for (int level = 0; level < mesh.num_levels; ++level)
       mesh.rest.row(mesh.node(column, level)) += amplitude * uniform * mesh.column_normals.row(column);
+    mesh.imperfection[column] += amplitude * uniform;
   }
 }
 

@@ -42,6 +42,7 @@ struct SkinMesh {
   std::vector<double> rim_turns;    ///< [rim_columns] how far the rim turns there, rad; 0 inside an edge
   std::vector<int> vertex_columns;  ///< column of each vertex of the input surface
   TriangleSurface surface;          ///< the input surface (vertices on the cylinder when bent)
+  VectorXd imperfection;            ///< [num_columns] mm along the normals, in `rest` already; empty = none
 
   int num_nodes() const { return num_columns * num_levels; }
   int node(int column, int level) const { return column * num_levels + level; }

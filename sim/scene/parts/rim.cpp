@@ -20,10 +20,10 @@ std::vector<int> columns_in(const SkinMesh& mesh, const SkinScene& skin, const H
   std::vector<int> columns;
   const int level = skin.surface.is_outer ? mesh.num_levels - 1 : 0;
   // Coordinates of nodes carry rounding: a box that ends at them holds them.
-  const Vec3 room =
-      Vec3::Constant(1e-9 * mesh.rest.cwiseAbs().maxCoeff() + skin.surface.imperfection_amplitude);
+  const Vec3 room = Vec3::Constant(1e-9 * mesh.rest.cwiseAbs().maxCoeff());
   for (int column = 0; column < mesh.num_columns; ++column) {
-    const Vec3 x = mesh.rest.row(mesh.node(column, level)).transpose();
+    Vec3 x = mesh.rest.row(mesh.node(column, level)).transpose();
+    if (mesh.imperfection.size() > 0) x -= mesh.imperfection[column] * mesh.column_normals.row(column);
     if (((x - held.low + room).array() >= 0).all() && ((held.high - x + room).array() >= 0).all())
       columns.push_back(column);
   }
@@ -93,6 +93,10 @@ Constraints skin_constraints(const SkinMesh& mesh, const SkinScene& skin, const 
       if (frame >= 0 && mesh.rim_turns[rim] > kCornerTurn) c.fixed_unknowns.push_back(3 * block + 1);
     }
   }
+  if (c.block_nodes.empty())
+    throw InputError(file + (skin.held.empty() ? ": /skin/rim" : ": /skin/held"),
+                     "no node that is free to move",
+                     "a skin with nodes off the rim and off held parts; a higher order or more cells");
   return c;
 }
 

@@ -17,7 +17,7 @@ inline constexpr double kCornerTurn = 35 * std::numbers::pi / 180;  // rad
 /// stays in its plane (outward conormal held), and a corner stays in both of its walls (both in-plane
 /// directions held, only the thickness direction is free); `free` nothing is held. Columns of the parts in
 /// skin.held are fixed, or moved along the part's path. Throws InputError naming `file` for a part without
-/// nodes, or two parts that share some.
+/// nodes, two parts that share some, or when no node is free.
 Constraints skin_constraints(const SkinMesh& mesh, const SkinScene& skin, const std::string& file);
 
 /// Rim columns that are corners, ascending.

@@ -135,6 +135,28 @@ TEST(Held, ErrorsNameThePart) {
               HasSubstr("/skin/held/right/path/1/time: got 0"));
 }
 
+// An imperfection moves nodes off the plane of a flat box by up to twice the distance to the next column: the
+// same columns are held as without it.
+TEST(Held, AnImperfectionNeitherAddsNorLosesColumns) {
+  const auto blocks = [](const std::string& imperfection) {
+    const SceneModel built(scene(
+        bar("", ""), {"/skin/surface/grid/cells=[40,8]", "/skin/surface/imperfection=" + imperfection}));
+    return built.model().constraints.block;
+  };
+  EXPECT_EQ(blocks(R"({"amplitude": 0.1})"), blocks("null"));
+  EXPECT_EQ(blocks(R"({"amplitude": 0.5})"), blocks("null"));
+}
+
+TEST(Held, WithNothingFreeThereIsNoSkinToSolveFor) {
+  const std::string expected = "got no node that is free to move";
+  EXPECT_THAT(error_of(bar("", ""), {"/skin/held/right/box/low=[-9,-2,0]", "/skin/surface/grid/cells=[1,1]",
+                                     "/skin/order=1"}),
+              HasSubstr("bar.json: /skin/held: " + expected));
+  EXPECT_THAT(error_of(bar("", ""), {"/skin/held=null", "/skin/rim=clamped", "/skin/surface/grid/cells=[1,1]",
+                                     "/skin/order=1"}),
+              HasSubstr("bar.json: /skin/rim: " + expected));
+}
+
 TEST(Held, IsWrittenAndReadBack) {
   const Scene once =
       scene(bar("", kShift), {R"(/skin/surface/imperfection={"amplitude": "1 um", "seed": 3})"});
