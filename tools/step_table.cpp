@@ -147,9 +147,9 @@ One row per converged step; the header carries the units. NAME stands for an ene
 | `dissipated_energy` | mJ | dissipated by all terms since the start |
 | `numerical_dissipation` | mJ | lost to the time discretisation since the start |
 | `energy_imbalance` | mJ | what the account leaves over: work - stored - dissipated - numerical, by rounding and tolerance |
-| `iterations` | | Newton iterations of the step |
-| `evaluations` | | evaluations of the energy |
-| `factorisations` | | factorisations of the Hessian |
+| `iterations` | | iterations of the solve that gave the step |
+| `evaluations` | | evaluations of the energy, also for guesses and attempts that were given up |
+| `factorisations` | | factorisations of the Hessian, likewise |
 | `bisections` | | how often the step was halved |
 | `softened` | | 1 when the step started from softened contacts |
 | `residual` | N | norm of the gradient at the end |

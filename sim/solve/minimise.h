@@ -67,6 +67,12 @@ struct MinimiserReport {
   double largest_pivot = 0;
   std::vector<double> residuals;  ///< at the start and after every accepted step, N
   bool converged() const { return status == MinimiserStatus::converged; }
+  /// Counts the evaluations and factorisations of an attempt that was given up.
+  void add_work(const MinimiserReport& given_up) {
+    evaluations += given_up.evaluations;
+    factorisations += given_up.factorisations;
+    failed_factorisations += given_up.failed_factorisations;
+  }
 };
 
 /// Called at the start (iteration 0) and after every accepted step; return false to stop (status interrupted,

@@ -195,14 +195,16 @@ void StepProblem::hessian_at(const VectorXd& u, Curvature curvature, BlockMatrix
   for (int i : model_->constraints.fixed_unknowns) out.fix(i);
 }
 
-VectorXd StepProblem::first_guess() {
+VectorXd StepProblem::first_guess(MinimiserReport& work) {
   const VectorXd held = model_->to_unknowns(old_->u);
   if (old_->velocity.size() == 0) return held;
   VectorXd moved = held + step_.dt() * model_->to_unknowns(old_->velocity);
+  work.evaluations += 2;
   return energy(moved, nullptr) < energy(held, nullptr) ? moved : held;
 }
 
-VectorXd StepProblem::response_to_given_motion(CholeskyFactor& factor, BlockMatrix& matrix) {
+VectorXd StepProblem::response_to_given_motion(CholeskyFactor& factor, BlockMatrix& matrix,
+                                               MinimiserReport& work) {
   // Far below every thickness, so that the difference of forces is linear; far above rounding.
   constexpr double kSmallMotion = 1e-4;  // mm
   if (given_.size() == 0) return {};
@@ -213,11 +215,16 @@ VectorXd StepProblem::response_to_given_motion(CholeskyFactor& factor, BlockMatr
   if (largest == 0) return {};
   const double scale = std::min(1., kSmallMotion / largest);
   VectorXd ahead, behind;
+  work.evaluations += 2;
   if (!std::isfinite(energy_at(old_->u + scale * motion, &ahead)) ||
       !std::isfinite(energy_at(old_->u - scale * motion, &behind)))
     return {};
   hessian_at(old_->u, Curvature::projected, matrix);
-  if (!factor.factorize(matrix)) return {};
+  ++work.factorisations;
+  if (!factor.factorize(matrix)) {
+    ++work.failed_factorisations;
+    return {};
+  }
   const VectorXd forces = (ahead - behind) / (2 * scale);
   return model_->to_unknowns(old_->u) - VectorXd(factor.solve(forces));
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sim/mesh/skin_mesh.h"
-#include "sim/solve/objective.h"
+#include "sim/solve/minimise.h"
 #include "sim/surface/implicit_shape.h"
 #include "sim/terms/path.h"
 #include "sim/terms/term.h"
@@ -113,12 +113,12 @@ class StepProblem final : public Objective {
   std::vector<double> term_energies(const VectorXd& u) const;
   /// Where to start the minimiser: the old displacement, or that moved on by the old velocity if the energy
   /// is lower there (on drags it halves the iterations; where a finger turns or stops, the energy refuses
-  /// it).
-  VectorXd first_guess();
+  /// it). Counts its evaluations in `work`.
+  VectorXd first_guess(MinimiserReport& work);
   /// When the step moves nodes: the old displacement and the skin's linear response to that motion, by one
   /// solve with the projected Hessian at the old state. Empty when nothing is moved or there is no such
-  /// factor.
-  VectorXd response_to_given_motion(CholeskyFactor& factor, BlockMatrix& matrix);
+  /// factor. Counts its evaluations and its factorisation in `work`.
+  VectorXd response_to_given_motion(CholeskyFactor& factor, BlockMatrix& matrix, MinimiserReport& work);
   /// The old state with the lag (pressure and normal of friction) that the step would leave if it ended at u:
   /// what another pass over the same step starts from.
   State relagged(const VectorXd& u) const;

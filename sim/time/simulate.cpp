@@ -65,6 +65,7 @@ class Runner {
   bool advance(int frame, double t_end, int depth_used, bool ends_frame) {
     // A pending stack of end times: a failed step is replaced by its two halves.
     std::vector<std::pair<double, int>> pending{{t_end, depth_used}};
+    MinimiserReport given_up;  // work of the steps that were halved
     while (!pending.empty()) {
       const auto [target, depth] = pending.back();
       const StepInfo step{static_cast<int>(run_.steps.size()), current_.time, target};
@@ -77,6 +78,7 @@ class Runner {
       bool softened = false;
       if (!report.converged()) {
         if (report.status != MinimiserStatus::interrupted && depth < options_.max_bisections) {
+          given_up.add_work(report);
           pending.back().second = depth + 1;
           pending.emplace_back(0.5 * (current_.time + target), depth + 1);
           continue;
@@ -84,6 +86,7 @@ class Runner {
         if (report.status != MinimiserStatus::interrupted) {
           MinimiserReport last = solver_.solve_softened(step, current_, callback);
           softened = last.converged();
+          last.add_work(report);
           if (softened || last.status == MinimiserStatus::interrupted) report = std::move(last);
         }
       }
@@ -98,6 +101,8 @@ class Runner {
         return false;
       }
       pending.pop_back();
+      report.add_work(given_up);
+      given_up = {};
       State next = solver_.problem().advance(solver_.displacement());
       StepRecord record{step, frame, depth - depth_used, softened, {}, std::move(report)};
       if (options_.account_energies) record.energies = account_step(solver_.problem(), next);

@@ -38,7 +38,7 @@ struct StepRecord {
   int bisections = 0;      ///< how often the nominal step was halved
   bool softened = false;   ///< its start came from softened penalties (the equations solved are the scene's)
   State state;             ///< after the step (empty when states are not kept)
-  MinimiserReport report;  ///< of the last pass, with the counts of all
+  MinimiserReport report;  ///< of the last pass, with the counts of all, and the work of attempts given up
   /// Displacements at which the passes before the last ended (empty when states are not kept, or for one
   /// pass).
   std::vector<VectorXd> earlier_passes = {};

@@ -30,14 +30,18 @@ MinimiserReport solve_step_softened(StepProblem& problem, const MinimiserOptions
   loose.relative_tolerance = std::max(kLooseTolerance, options.relative_tolerance);
   loose.max_iterations = std::min(kLooseIterations, options.max_iterations);
   loose.certify_minimum = loose.polish = false;
+  MinimiserReport work;
   for (double scale = kSoftest; scale < 0.5; scale *= kFactor) {
     VectorXd native = problem.native();
     for (const int i : penalties) native[i] = std::min(native[i], scale * stiffest);
     StepProblem soft(model, native, problem.step(), problem.old());
     const MinimiserReport report = minimise(soft, q, loose, factor, matrix, callback);
+    work.add_work(report);
     if (report.status == MinimiserStatus::interrupted) return report;
   }
-  return minimise(problem, q, options, factor, matrix, callback);
+  MinimiserReport report = minimise(problem, q, options, factor, matrix, callback);
+  report.add_work(work);
+  return report;
 }
 
 }  // namespace rhytid

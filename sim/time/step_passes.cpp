@@ -25,20 +25,27 @@ MinimiserReport StepSolver::solve_pass(VectorXd& q, const VectorXd& held, const 
   MinimiserReport report = minimise(*problem_, q, options_, factor_, matrix_, callback);
   if (report.converged() || report.status == MinimiserStatus::interrupted || !moved) return report;
   q = held;
-  return minimise(*problem_, q, options_, factor_, matrix_, callback);
+  const MinimiserReport given_up = std::move(report);
+  report = minimise(*problem_, q, options_, factor_, matrix_, callback);
+  report.add_work(given_up);
+  return report;
 }
 
 MinimiserReport StepSolver::solve(const StepInfo& step, const State& old, const VectorXd* start,
                                   const IterationCallback& callback) {
   problem_.emplace(*model_, *native_, step, old);
-  VectorXd q = start ? model_->to_unknowns(*start) : problem_->first_guess();
+  MinimiserReport guess;
+  VectorXd q = start ? model_->to_unknowns(*start) : problem_->first_guess(guess);
   if (!start && !model_->constraints.moved.empty()) {
-    const VectorXd response = problem_->response_to_given_motion(factor_, matrix_);
-    if (response.size() > 0 && problem_->energy(response, nullptr) < problem_->energy(q, nullptr))
-      q = response;
+    const VectorXd response = problem_->response_to_given_motion(factor_, matrix_, guess);
+    if (response.size() > 0) {
+      guess.evaluations += 2;
+      if (problem_->energy(response, nullptr) < problem_->energy(q, nullptr)) q = response;
+    }
   }
   const VectorXd held = start ? q : model_->to_unknowns(old.u);
   MinimiserReport first = solve_pass(q, held, callback);
+  first.add_work(guess);
   return solve_later_passes(step, std::move(first), std::move(q), held, callback);
 }
 
@@ -65,10 +72,8 @@ MinimiserReport StepSolver::solve_later_passes(const StepInfo& step, MinimiserRe
     MinimiserReport report = solve_pass(q, held, callback);
     report.iterations += total.iterations;
     report.lbfgs_iterations += total.lbfgs_iterations;
-    report.evaluations += total.evaluations;
-    report.factorisations += total.factorisations;
-    report.failed_factorisations += total.failed_factorisations;
     report.negative_curvature_exits += total.negative_curvature_exits;
+    report.add_work(total);
     total = std::move(report);
   }
 }

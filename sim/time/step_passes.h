@@ -27,7 +27,8 @@ class StepSolver {
   /// Solves the step from displacement `start` [num_nodes·3], or, when it is null, from
   /// StepProblem::first_guess and once more from the old displacement if that does not converge; each later
   /// pass from where the one before ended. `old` must live as long as problem() is used. The report is that
-  /// of the last pass, with the counts of all; when a pass fails it is that pass's.
+  /// of the last pass, with the counts of all; when a pass fails it is that pass's. Evaluations and
+  /// factorisations are all that the step took, those of the guess and of a start that was given up too.
   [[nodiscard]] MinimiserReport solve(const StepInfo& step, const State& old, const VectorXd* start = nullptr,
                                       const IterationCallback& callback = {});
   /// The same, the first pass by solve_step_softened (simulate.h).

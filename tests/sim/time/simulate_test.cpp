@@ -183,6 +183,51 @@ TEST(Simulate, ContinuesFromAStateAsIfItHadNotStopped) {
   EXPECT_LE((second.at_frame(2).u - whole.at_frame(4).u).lpNorm<Eigen::Infinity>(), 1e-7);
 }
 
+/// What the reports of a run say of its work is what its skin was asked for: guesses, halved steps and
+/// softened contacts included.
+void expect_all_work_counted(const SceneModel& m, const Trajectory& run) {
+  const Term& skin = m.model().terms.front();
+  ASSERT_EQ(skin.name(), "skin");
+  long evaluations = 0, factorisations = 0;
+  for (const StepRecord& r : run.steps) {
+    evaluations += r.report.evaluations;
+    factorisations += r.report.factorisations;
+  }
+  EXPECT_EQ(evaluations, skin.counters().energy + skin.counters().gradient);
+  EXPECT_GE(factorisations, skin.counters().hessian);
+}
+
+TEST(Simulate, ReportsCountAllWork) {
+  const std::string held = R"(/skin/held=[{"name": "side", "box": {"low": [-8, -6, 0], "high": [-8, 6, 0]},
+      "path": [{"time": 0, "displacement": [0, 0, 0]}, {"time": 0.1, "displacement": [0.5, 0.2, 0]}]}])";
+  const SceneModel moved(parse_scene_text(test::drag_scene(2, 3), "moved.json", {held}));
+  const Trajectory pulled = run_scene(moved, moved.run_options());
+  ASSERT_TRUE(pulled.complete) << pulled.failure;
+  expect_all_work_counted(moved, pulled);
+
+  Scene s = small_drag(2, 2);
+  s.colliders[0].path[1].time = 1. / 24;  // the whole press in one frame
+  s.colliders[0].path[1].position[2] = 4.2;
+  const SceneModel easy(s), hard(s), soft(s);
+  RunOptions options = easy.run_options();
+  const Trajectory direct = run_scene(easy, options);
+  ASSERT_TRUE(direct.complete) << direct.failure;
+  expect_all_work_counted(easy, direct);
+  int most = 0;
+  for (const StepRecord& r : direct.steps) most = std::max(most, r.report.iterations);
+  options.minimiser.max_iterations = most - 1;
+  options.max_bisections = 6;
+  const Trajectory bisected = run_scene(hard, options);
+  ASSERT_TRUE(bisected.complete) << bisected.failure;
+  EXPECT_GT(bisected.steps.front().bisections, 0);
+  expect_all_work_counted(hard, bisected);
+  options.max_bisections = 0;
+  const Trajectory softened = run_scene(soft, options);
+  ASSERT_TRUE(softened.complete) << softened.failure;
+  EXPECT_TRUE(softened.steps.front().softened);
+  expect_all_work_counted(soft, softened);
+}
+
 /// The densest rule that a scene may ask for fits into an element kernel.
 TEST(Simulate, DensestQuadratureOfASceneRuns) {
   Scene s = parse_scene_text(test::drag_scene(1, 1), "drag.json",
