@@ -8,6 +8,7 @@
 #include "sim/scene/scene_surface.h"
 #include "tests/sim/mesh/mesh_files.h"
 #include "tests/sim/mesh/surface_testing.h"
+#include "tests/support/memory_limit.h"
 
 namespace rhytid {
 namespace {
@@ -143,6 +144,8 @@ TEST(ReadGlb, KeepsItsSeamsWhenTold) {
 
 /// Small files that claim to hold more than they do: refused at once, without room for what they claim.
 TEST(ReadSurface, RefusesSmallFilesThatClaimMuch) {
+  const test::MemoryLimit limit(std::size_t{256} << 20);
+  EXPECT_THROW((void)std::vector<double>(std::size_t{1} << 26), std::bad_alloc);
   const auto start = std::chrono::steady_clock::now();
   const auto ply = [](const std::string& vertices, const std::string& faces, const std::string& rest) {
     return "ply\nformat ascii 1.0\nelement vertex " + vertices +
