@@ -28,8 +28,10 @@ SurfaceSamples::SurfaceSamples(const SkinMesh& mesh, const SampleWindow& window,
   require(spacing > 0 && window.size.minCoeff() >= 2 * spacing,
           "SurfaceSamples: a window of at least 3 x 3 points");
   const Vec3 first = window.along.normalized(), second = window.normal.cross(first).normalized();
-  rows_ = 1 + static_cast<int>(window.size[0] / spacing);
-  columns_ = 1 + static_cast<int>(window.size[1] / spacing);
+  // A quotient of decimals may lie just below the number that is meant: 0.6 / 0.2 = 2.9999999999999996.
+  const auto intervals = [&](double size) { return static_cast<int>(std::floor(size / spacing + 1e-9)); };
+  rows_ = 1 + intervals(window.size[0]);
+  columns_ = 1 + intervals(window.size[1]);
   std::vector<Vec3> wanted;
   for (int j = 0; j < columns_; ++j)
     for (int i = 0; i < rows_; ++i)

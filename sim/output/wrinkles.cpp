@@ -93,6 +93,7 @@ double half_pass_deviation(double wavelength) {
 }
 
 VectorXd band_pass(const VectorXd& heights, double spacing, const WrinkleBand& band) {
+  require(heights.allFinite(), "band_pass: a line of finite heights");
   return pass(heights, spacing, band);
 }
 MatrixXd band_pass(const MatrixXd& heights, double spacing, const WrinkleBand& band) {
@@ -100,6 +101,7 @@ MatrixXd band_pass(const MatrixXd& heights, double spacing, const WrinkleBand& b
 }
 
 WrinkleSums wrinkle_sums(const VectorXd& b, double spacing) {
+  require(b.allFinite(), "wrinkle_sums: a line of finite heights");
   WrinkleSums sums;
   for (Eigen::Index i = 2; i + 2 < b.size(); ++i) {
     const double square = b[i] * b[i], slope = derivative(b[i - 2], b[i - 1], b[i + 1], b[i + 2], spacing);
@@ -144,6 +146,7 @@ WrinkleDescriptors describe(const WrinkleSums& sums) {
 
 WrinkleCount count_wrinkles(const VectorXd& h, double spacing, double prominence) {
   require(spacing > 0 && prominence >= 0, "count_wrinkles: spacing > 0 and prominence >= 0");
+  require(h.allFinite(), "count_wrinkles: a line of finite heights");
   WrinkleCount count;
   const int n = static_cast<int>(h.size());
   if (n < 3) return count;

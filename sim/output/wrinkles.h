@@ -32,7 +32,8 @@ struct WrinkleBand {
 /// Standard deviation of the Gaussian that halves waves of this length, mm.
 double half_pass_deviation(double wavelength);
 
-/// Band-passed heights along a line, [n]. Linear in the heights.
+/// Band-passed heights along a line, [n]. Linear in the heights. Here and below a line has no gaps: throws
+/// ContractError unless all heights are finite.
 VectorXd band_pass(const VectorXd& heights, double spacing, const WrinkleBand& band);
 
 /// The same on a grid [nx][ny]; NaN marks points that are not on the surface, there and nowhere else the

@@ -31,13 +31,12 @@ TEST(Bone, ZeroLoadGivesZeroDisplacementOnConvexBone) {
       // The gap of the middle of the patch; a cylinder bends one way only: half the gap of the sphere −c
       // h²/R.
       const SkinMesh& mesh = m.model().mesh;
-      double gap = 0, radius = 0;
+      double gap = 0;
       for (int c = 0; c < mesh.num_columns; ++c) {
         const Vec3 x = mesh.rest.row(mesh.node(c, 0)).transpose();
         const GapJet jet = m.model().shapes[0]->evaluate(x);
         ASSERT_TRUE(jet.supported);
         if (jet.gap < gap) gap = jet.gap;
-        radius = std::max(radius, x.norm());
       }
       const double inner = bend - 1.65, moment = kernel[0] == 's' ? 1. / 12 : 3. / 56;
       std::printf(

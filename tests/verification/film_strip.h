@@ -25,17 +25,17 @@ struct Scheme {
   int composite_order, soft_order, soft_elements;
 };
 
-std::vector<StackLayer> layers_of(const Stack& s) {
+inline std::vector<StackLayer> layers_of(const Stack& s) {
   return {{s.soft, 0.02}, {s.film, 0.02 * s.ratio}};
 }
 
 /// Fine enough to be exact: see WavesThatAreKnown.
-std::vector<StackElement> fine_elements() {
+inline std::vector<StackElement> fine_elements() {
   return {{1, 6, 7, 0.35}, {1, 6, 7, 0.3}, {1, 6, 7, 0.2}, {1, 6, 7, 0.15}, {1, 6, 7}};
 }
 
 /// The same polynomials and Gauss points as the simulator's elements.
-std::vector<StackElement> elements_of(const Scheme& s) {
+inline std::vector<StackElement> elements_of(const Scheme& s) {
   if (s.composite_order > 0) return {{2, s.composite_order, s.composite_order + 1}};
   std::vector<StackElement> e(static_cast<std::size_t>(s.soft_elements),
                               {1, s.soft_order, s.soft_order + 1, 1.0 / s.soft_elements});

@@ -78,8 +78,10 @@ TEST(HeatHull, QuarticElementsAtTheirPoints) {
     const SceneModel m(parse_scene_text(
         test::drag_scene(4, 1), "hull.json",
         {"/skin/surface/grid/cells=[4,3]", "/ligaments/diffusion_time=" + std::to_string(time)}));
+    int maps = 0;
     for (const Term& term : m.model().terms) {
       if (term.name() != "ligaments") continue;
+      ++maps;
       double low = 1e300, high = -1e300;
       for (const auto& group : term.load_theta({0, 0, 1}, m.native()))
         for (std::size_t k = 2; k < group.size(); k += 3) {
@@ -92,6 +94,7 @@ TEST(HeatHull, QuarticElementsAtTheirPoints) {
       EXPECT_LE(high, 3 * (1 + 1e-14));
       EXPECT_LT(low, high);
     }
+    EXPECT_EQ(maps, 1);
   }
 }
 

@@ -71,7 +71,8 @@ TEST(Structures, CooksMembrane) {
   EXPECT_NEAR(value, 18.37, 0.01 * 18.37);
 }
 
-/// Displacement of the tip of a beam along `direction` under a unit load that way; the root is clamped.
+/// Displacement of the tip of a beam along `direction` under a unit load that way; the root stays in its
+/// plane and may contract there.
 double tip(int nx, int ny, const Place& place, double youngs_modulus, double nu, const Vec3& direction) {
   const Shape shape(4, 2, nx, ny, place);
   LinearElasticity k(shape.mesh, youngs_modulus, nu);

@@ -54,6 +54,18 @@ TEST(SurfaceSamples, PointsBesideThePatchAreLeftOut) {
   EXPECT_NEAR(h(30, 16), 4, 1e-12);
 }
 
+TEST(SurfaceSamples, AWindowHoldsThePointsAtItsEnds) {
+  SampleWindow window;
+  window.size = {0.6, 4.4};  // 2.9999999999999996 and 22.000000000000004 times 0.2
+  const SurfaceSamples samples(patch(0), window, 0.2);
+  EXPECT_EQ(samples.rows(), 4);
+  EXPECT_EQ(samples.columns(), 23);
+  window.size = {0.79, 0.41};
+  const SurfaceSamples inside(patch(0), window, 0.2);
+  EXPECT_EQ(inside.rows(), 4);
+  EXPECT_EQ(inside.columns(), 3);
+}
+
 TEST(SurfaceSamples, OnACylinderHeightsAreAlongItsNormals) {
   const SkinMesh mesh = patch(15);
   // The chord lies under the surface; its points are moved out to it.

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
+
+#include "sim/core/error.h"
 
 namespace rhytid {
 namespace {
@@ -55,6 +58,15 @@ TEST(Wrinkles, SmallBumpsAreNoCrests) {
   // Bumps are maxima of their own where they are steeper than the wave: |5 cos| < 0.03 · 61, of the 61
   // some 14.5.
   EXPECT_NEAR(count_wrinkles(h, 0.1, 1e-4).crests, 14.5, 2.5);
+}
+
+// A point beside the surface (NaN) would spread over the line and read as no wrinkles.
+TEST(Wrinkles, ALineHasNoGaps) {
+  VectorXd h = train(0.07, 3.8, 20, 60);
+  h[400] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW((void)band_pass(h, 0.1, WrinkleBand{0.5, 8}), ContractError);
+  EXPECT_THROW((void)wrinkle_sums(h, 0.1), ContractError);
+  EXPECT_THROW((void)count_wrinkles(h, 0.1), ContractError);
 }
 
 TEST(Wrinkles, NoWrinklesNoNumbers) {
