@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sim/scene/names.h"
+
 namespace rhytid::adjoint {
 
 namespace {
@@ -15,10 +17,6 @@ std::string line(const char* format, auto... values) {
 
 const char* limit_sign(LimitKind kind) {
   return kind == LimitKind::at_most ? "<=" : kind == LimitKind::at_least ? ">=" : "near";
-}
-
-const char* transform_name(ParameterTransform t) {
-  return t == ParameterTransform::log ? "log" : t == ParameterTransform::logit ? "logit" : "none";
 }
 
 }  // namespace
@@ -48,7 +46,7 @@ std::string certificate_text(const CertificateReport& r) {
   out += "\nparameter                                             value          dQ/d(coordinate)\n";
   for (std::size_t k = 0; k < r.parameters.size(); ++k)
     out += line("  %-50s %.6g %s (%s)  %.6e", r.parameters[k].address.c_str(), r.parameters[k].value,
-                r.parameters[k].unit.c_str(), transform_name(r.parameters[k].transform), r.gradient[k]);
+                r.parameters[k].unit.c_str(), to_string(r.parameters[k].transform).c_str(), r.gradient[k]);
   for (const std::string& address : r.without_effect) out += "  " + address + "  no effect\n";
   if (!r.regimes.empty()) out += "\npoints over all steps\n";
   for (const RegimeCount& c : r.regimes)
@@ -93,7 +91,7 @@ nlohmann::json certificate_json(const CertificateReport& r) {
     j["parameters"].push_back({{"address", r.parameters[k].address},
                                {"value", r.parameters[k].value},
                                {"unit", r.parameters[k].unit},
-                               {"transform", transform_name(r.parameters[k].transform)},
+                               {"transform", to_string(r.parameters[k].transform)},
                                {"gradient", r.gradient[k]}});
   j["without_effect"] = r.without_effect;
   for (const RegimeCount& c : r.regimes)

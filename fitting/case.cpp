@@ -10,6 +10,7 @@
 #include "sim/core/units.h"
 #include "sim/scene/load.h"
 #include "sim/scene/located_json.h"
+#include "sim/scene/names.h"
 #include "sim/scene/nearest.h"
 #include "sim/scene/validate.h"
 
@@ -62,9 +63,9 @@ class ParameterReader {
     if (item.contains("prior_sigma")) p.prior_sigma = item["prior_sigma"].get<double>();
     if (item.contains("transform")) {
       const std::string word = item["transform"];
-      p.transform = word == "log"     ? ParameterTransform::log
-                    : word == "logit" ? ParameterTransform::logit
-                                      : ParameterTransform::none;
+      const auto& words = EnumNames<ParameterTransform>::words;
+      p.transform =
+          static_cast<ParameterTransform>(std::find(words.begin(), words.end(), word) - words.begin());
     }
     check(p, spec, item);
     return p;

@@ -1,6 +1,7 @@
 #include "fitting/case_rules.h"
 
 #include "fitting/case.h"
+#include "sim/scene/names.h"
 #include "sim/scene/schema.h"
 
 namespace rhytid::fitting {
@@ -159,7 +160,7 @@ std::vector<Rule> fit_rules() {
       {.pointer = item + "/upper", .type = RuleType::quantity, .doc = "Upper bound."},
       {.pointer = item + "/transform",
        .type = RuleType::option,
-       .options = {"none", "log", "logit"},
+       .options = enum_words<ParameterTransform>(),
        .doc = "What the optimiser sees: the value p, ln p, or ln((p - lower)/(upper - p))."},
       {.pointer = item + "/prior_sigma",
        .min = 0,

@@ -21,12 +21,6 @@ std::string number(const char* pattern, double x) {
   return text;
 }
 
-const char* name_of(ParameterTransform transform) {
-  return transform == ParameterTransform::log     ? "log"
-         : transform == ParameterTransform::logit ? "logit"
-                                                  : "none";
-}
-
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
   std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
@@ -141,7 +135,7 @@ void add_parameters(const FitProblem& problem, const VectorXd& t, const Identifi
     FittedParameter f{.address = v.address,
                       .name = v.name,
                       .unit = v.unit,
-                      .transform = name_of(v.transform),
+                      .transform = to_string(v.transform),
                       .initial = v.initial,
                       .value = std::clamp(v.to_parameter(t[k]), v.lower, v.upper),
                       .lower = v.lower,

@@ -16,7 +16,7 @@ void use_threads(int n);
 /// so this sets the variable to passive and starts the program anew in the same process (execv of
 /// /proc/self/exe). Loading the libraries a second time takes 6 ms of processor time for rhytid-forward, but
 /// 180 ms for rhytid, whose 260 libraries come with OpenCV (measured on a busy machine); so only a call that
-/// names a verb pays it.
+/// names a verb pays it. The process then takes its name back, which pgrep and top show (it would be "exe").
 ///
 /// Returns, and all goes on with spinning threads, when OMP_WAIT_POLICY or GOMP_SPINCOUNT is set already (by
 /// the user, who is then obeyed, or by this function, which so acts once at most), and when starting anew is

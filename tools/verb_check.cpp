@@ -9,6 +9,7 @@
 #include "sim/core/units.h"
 #include "sim/scene/feature_work.h"
 #include "sim/scene/load.h"
+#include "sim/scene/names.h"
 #include "sim/scene/parameter.h"
 #include "tools/frame_writer.h"
 #include "tools/model_size.h"
@@ -156,12 +157,6 @@ ordered_json to_json(const Findings& f) {
   return j;
 }
 
-const char* transform_text(ParameterTransform transform) {
-  return transform == ParameterTransform::log     ? "log"
-         : transform == ParameterTransform::logit ? "logit"
-                                                  : "none";
-}
-
 class Lines {
  public:
   explicit Lines(std::ostream& out) : out_(out) {}
@@ -276,7 +271,7 @@ ordered_json parameters_json(const Scene& scene) {
                     {"unit", p.unit},
                     {"lower", p.lower},
                     {"upper", p.upper},
-                    {"transform", transform_text(p.transform)}});
+                    {"transform", to_string(p.transform)}});
   return list;
 }
 
@@ -293,7 +288,7 @@ void print_parameters(const Scene& scene, std::ostream& out) {
   for (const ParameterSpec& p : all) {
     row(p.address, number_text(p.value, "%.6g"), p.unit.empty() ? "-" : p.unit, number_text(p.lower, "%.6g"),
         number_text(p.upper, "%.6g"));
-    out << "  " << transform_text(p.transform) << '\n';
+    out << "  " << to_string(p.transform) << '\n';
   }
 }
 

@@ -1,5 +1,6 @@
 // rhytid track: footage to tracks of skin points, with their uncertainty.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <sstream>
 
 #include "fitting/case.h"
@@ -49,8 +50,11 @@ class TrackVerb : public Verb {
   ExitCode run(VerbContext& context) override {
     if (context.options.file.empty() && video_.empty())
       throw InputError("track", "neither a case nor --video", "one of the two");
-    if (roi_.size() == 4 && !(roi_[0] >= 0 && roi_[1] >= 0 && roi_[2] >= 1 && roi_[3] >= 1))
-      throw InputError("--roi", roi_text(), "X,Y,W,H in px with a width and a height of at least 1");
+    const auto is_in_range = [](double value) { return value >= 0 && value <= 1e5; };  // as /track/roi
+    if (roi_.size() == 4 &&
+        !(std::all_of(roi_.begin(), roi_.end(), is_in_range) && roi_[2] >= 1 && roi_[3] >= 1))
+      throw InputError("--roi", roi_text(),
+                       "X,Y,W,H in px, from 0 to 100000, with a width and a height of at least 1");
     const std::string folder = context.output_folder();
     TrackJob job;
     if (context.options.file.empty()) {

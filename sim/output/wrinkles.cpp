@@ -132,7 +132,10 @@ WrinkleDescriptors describe(const WrinkleSums& sums) {
   WrinkleDescriptors d;
   const double steepness = sums.gradient.trace();
   if (!(sums.square > 0) || !(sums.fourth > 0) || !(steepness > 0)) return d;
-  d.amplitude = std::sqrt(4. / 3 * sums.fourth / sums.square);
+  const double amplitude = std::sqrt(4. / 3 * sums.fourth / sums.square);
+  const double slope = amplitude * std::sqrt(steepness / sums.square);
+  if (amplitude < least_wrinkle_height || slope < least_wrinkle_slope) return d;
+  d.amplitude = amplitude;
   d.wavelength = 2 * std::numbers::pi * std::sqrt(sums.square / steepness);
   d.extent = 1.5 * sums.square * sums.square / sums.fourth;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(sums.gradient);
@@ -151,8 +154,8 @@ WrinkleCount count_wrinkles(const VectorXd& h, double spacing, double prominence
   const int n = static_cast<int>(h.size());
   if (n < 3) return count;
   const double range = h.maxCoeff() - h.minCoeff();
-  if (range == 0) return count;
   count.largest = 0.5 * range;
+  if (count.largest < least_wrinkle_height) return count;
 
   // A crest is confirmed once the profile has fallen by the wanted rise; valleys likewise.
   const double rise = prominence * range;

@@ -11,7 +11,7 @@
 //   wavelength   λ = 2π (∫b²/∫|∇b|²)^½
 //   extent       length or area of the train:  3/2 · (∫b²)²/∫b⁴
 //   direction    of k: main axis of ∫∇b ∇bᵀ;  coherence: (t₁ − t₂)/(t₁ + t₂) of its eigenvalues
-// They are smooth functions of the displacements wherever b is not zero (counts are not).
+// They are smooth functions of the displacements wherever there are wrinkles (counts are not).
 //
 // Units   mm, rad.   Tests   tests/sim/output/test_wrinkles.cpp
 #pragma once
@@ -21,6 +21,14 @@
 #include "sim/core/types.h"
 
 namespace rhytid {
+
+/// Waves lower than this are none, mm: a nanometre, far below what skin can show and far above what rounding
+/// leaves on a flat surface (1e-14 mm). A fraction of the largest height would not do: it may be rounding
+/// too.
+inline constexpr double least_wrinkle_height = 1e-6;
+/// Nor are those less steep than this: a nanometre over a metre. A flat surface that is lifted has only
+/// rounding for slopes, but any height.
+inline constexpr double least_wrinkle_slope = 1e-9;
 
 /// Wavelengths that count as wrinkles, mm. Outside they fade away.
 struct WrinkleBand {
@@ -57,10 +65,12 @@ struct WrinkleDescriptors {
   double direction = 0;
   double coherence = 0;  ///< 0: waves in all directions, 1: in one
 };
-/// All zero for a surface without wrinkles.
+/// All zero for a surface without wrinkles, that is with an amplitude A below least_wrinkle_height
+/// or a slope 2π A/λ below least_wrinkle_slope.
 WrinkleDescriptors describe(const WrinkleSums& sums);
 
-/// Counts along a line. They jump where descriptors do not.
+/// Counts along a line. They jump where descriptors do not. None when `largest` is below
+/// least_wrinkle_height.
 struct WrinkleCount {
   /// Maxima that rise from both sides by at least `prominence` × (largest − smallest height).
   int crests = 0;

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sim/scene/parameter.h"
 #include "sim/scene/scene.h"
 
 namespace rhytid {
@@ -45,6 +46,12 @@ struct EnumNames<ShapeKind> {
 template <>
 struct EnumNames<PathKind> {
   static constexpr std::array<std::string_view, 3> words{"linear", "spline", "clamped_spline"};
+};
+
+/// Not of scenes: of cases, records and lists of parameters.
+template <>
+struct EnumNames<ParameterTransform> {
+  static constexpr std::array<std::string_view, 3> words{"none", "log", "logit"};
 };
 
 /// The word for a value: "exponential", "clamped", ...

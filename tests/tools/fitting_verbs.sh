@@ -93,6 +93,7 @@ expect 2 1 'got a value of the scene, .*: --set "/settings/1=/skin/order=3"$' fi
 
 expect 2 1 '^rhytid: error: --max-tracks' track case.json -o a --max-tracks=-7
 expect 2 1 '^rhytid: error: --roi: got 0,0,0,0, expected' track case.json -o a --roi 0,0,0,0
+expect 2 1 '^rhytid: error: --roi: got 0,0,1e\+12,1e\+12, expected .* from 0 to 100000' track case.json -o a --roi 0,0,1e12,1e12
 expect 2 1 '^rhytid: error: --model' track case.json -o a --model rigid
 expect 2 1 '/track/roi: got \[0.0,0.0,0.0,5.0\], expected' track case.json -o a --set '/track/roi=[0, 0, 0, 5]'
 

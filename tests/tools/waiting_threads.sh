@@ -28,6 +28,13 @@ expect '[1-9][0-9]*'
 "$program" doctor --no-such-option >/dev/null 2>&1
 [ $? = 2 ] || fail "the exit code of bad input is lost"
 [ "$("$program" schema </dev/null | head -c 1)" = "{" ] || fail "arguments are lost"
+# What pgrep and top call the process is the program: looked at while it waits for somebody to read the rest of 190 kB.
+exec 3< <(exec "$program" schema)
+pid=$!
+read -r -u 3 _
+name=$(cat /proc/$pid/comm)
+exec 3<&-
+[ "$name" = "$(basename "$program")" ] || fail "the process is called '$name'"
 # Through the loader the program runs, though it cannot start anew.
 loader=$(find /lib64 /lib -maxdepth 1 -name 'ld-linux*.so.*' 2>/dev/null | head -n 1)
 [ -z "$loader" ] || "$loader" "$program" --version | grep -q . || fail "$loader $program --version"

@@ -76,6 +76,37 @@ TEST(Wrinkles, NoWrinklesNoNumbers) {
   EXPECT_EQ(count_wrinkles(VectorXd::Zero(50), 0.1).crests, 0);
 }
 
+TEST(Wrinkles, RoundingOfAFlatSurfaceIsNone) {
+  // What a flat skin under a pre-stretch shows, and the same waves where they are real.
+  for (const double height : {5e-17, 1e-14, 1e-7, 1e-5, 1e-2}) {
+    const bool is_real = height > 1e-6;
+    const VectorXd h = train(height, 3.8, 20, 60);
+    const WrinkleCount count = count_wrinkles(h, 0.1);
+    EXPECT_EQ(count.crests > 0, is_real) << height;
+    EXPECT_EQ(count.sign_changes > 0, is_real) << height;
+    EXPECT_NEAR(count.crest_spacing, is_real ? 3.8 : 0, 0.08) << height;
+    EXPECT_NEAR(count.largest, height, 0.02 * height);
+    const WrinkleDescriptors d = describe(wrinkle_sums(h, 0.1));
+    EXPECT_NEAR(d.amplitude, is_real ? height : 0, 0.02 * height);
+    EXPECT_NEAR(d.wavelength, is_real ? 3.8 : 0, 0.04) << height;
+    EXPECT_EQ(d.extent > 0, is_real) << height;
+  }
+}
+
+TEST(Wrinkles, LiftingAFlatSurfaceMakesNone) {
+  for (const double height : {5e-17, 1e-14, 1e-5}) {
+    const VectorXd h = train(height, 3.8, 20, 60).array() + 0.7;
+    const bool is_real = height > 1e-6;
+    EXPECT_EQ(count_wrinkles(h, 0.1).crests > 0, is_real) << height;
+    const WrinkleDescriptors d = describe(wrinkle_sums(h, 0.1));
+    EXPECT_EQ(d.amplitude > 0, is_real) << height;
+    EXPECT_EQ(d.wavelength > 0, is_real) << height;
+    MatrixXd grid(60, 40);
+    for (Eigen::Index i = 0; i < grid.rows(); ++i) grid.row(i).setConstant(h[300 + i]);
+    EXPECT_EQ(describe(wrinkle_sums(grid, 0.1)).coherence > 0, is_real) << height;
+  }
+}
+
 TEST(BandPass, HalvesWavesOfItsLimits) {
   // Far from the ends a sine only changes its height.
   for (const double wavelength : {1., 10.}) {
