@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "fitting/identifiability.h"
-#include "fitting/spatial_misfit.h"
 #include "sim/core/error.h"
 #include "sim/scene/names.h"
 #include "sim/scene/parameter.h"
@@ -61,21 +60,25 @@ NoiseCheck check_noise(FitProblem& problem, const FitEvaluation& at, const Vecto
   return check;
 }
 
-/// What neighbouring tracks err alike, scaled so that the quantile of all residuals' degrees of freedom gives
-/// the interval that the few independent patches allow.
-MatrixXd common_misfit(const FitProblem& problem, const FitProblem::Linearised& at, double quantile) {
-  MatrixXd scores(problem.num_parameters(), problem.compared().size());
-  std::vector<Vec2> pixels;
+/// Residuals and Jacobian by track, rows numbered by frame and axis; shifts count as frame 0 and, from a renewal on,
+/// as frames behind the last.
+std::vector<WhitenedTrack> whitened_tracks(const FitProblem& problem, const FitProblem::Linearised& at) {
+  std::vector<WhitenedTrack> tracks;
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < problem.compared().size(); ++i) {
+    const FitProblem::ComparedTrack& c = problem.compared()[i];
     const Eigen::Index n = problem.noise()[i].num_rows();
-    scores.col(static_cast<Eigen::Index>(i)) =
-        at.jacobian.middleRows(row, n).transpose() * at.residuals.segment(row, n);
-    pixels.push_back(problem.compared()[i].first);
+    WhitenedTrack track{c.first, {}, at.jacobian.middleRows(row, n), at.residuals.segment(row, n)};
+    for (const int frame : c.frames)
+      for (const int axis : {0, 1}) track.rows.push_back(2 * frame + axis);
+    const TrackNoise& noise = problem.noise()[i];
+    for (int shift = 0; shift < noise.num_shifts(); ++shift)
+      for (const int axis : {0, 1})
+        track.rows.push_back(shift == 0 ? axis : 2 * (problem.frames() + shift) + axis);
+    tracks.push_back(std::move(track));
     row += n;
   }
-  const double ratio = student_quantile_975(kMisfitDegrees) / quantile;
-  return ratio * ratio * spatial_score_covariance(scores, pixels);
+  return tracks;
 }
 
 /// Truth in the units of the held modulus: displacements only tell stiffnesses relative to it.
@@ -96,7 +99,7 @@ std::map<std::string, double> truth_in_gauge(const FitInput& input, const Parame
 }
 
 void add_modulus_ratios(const FitProblem& problem, const Identifiability& found, const VectorXd& t,
-                        double quantile, const std::map<std::string, double>& truth, FitResult& result) {
+                        const std::map<std::string, double>& truth, FitResult& result) {
   const Parametrisation& p = problem.parametrisation();
   const Scene scene = p.scene(t);
   const std::string base = p.gauge_layer();
@@ -114,7 +117,7 @@ void add_modulus_ratios(const FitProblem& problem, const Identifiability& found,
     if (above < 0 && below < 0) continue;
     if (above >= 0) g[above] += p.variables()[above].derivative(t[above]) / modulus(layer.name);
     if (below >= 0) g[below] -= p.variables()[below].derivative(t[below]) / modulus(base);
-    const double half = quantile * found.sigma(g);
+    const double half = found.half_width(g);
     DerivedQuantity ratio{.name = "Young's modulus " + layer.name + " / " + base,
                           .unit = "",
                           .value = modulus(layer.name) / modulus(base),
@@ -128,7 +131,7 @@ void add_modulus_ratios(const FitProblem& problem, const Identifiability& found,
 }
 
 void add_parameters(const FitProblem& problem, const VectorXd& t, const Identifiability* found,
-                    double quantile, const std::map<std::string, double>& truth, FitResult& result) {
+                    const std::map<std::string, double>& truth, FitResult& result) {
   const Parametrisation& p = problem.parametrisation();
   for (int k = 0; k < p.size(); ++k) {
     const FitVariable& v = p.variables()[k];
@@ -145,7 +148,7 @@ void add_parameters(const FitProblem& problem, const VectorXd& t, const Identifi
     f.at_bound = std::min(t[k] - p.lower()[k], p.upper()[k] - t[k]) < 1e-6 * range;
     f.sigma = found != nullptr ? found->sigma(k) : std::numeric_limits<double>::infinity();
     f.determined = found != nullptr && found->determined(k);
-    const double half = quantile * f.sigma;
+    const double half = found != nullptr ? found->half_width(k) : f.sigma;
     f.low95 = std::isfinite(half) ? std::max(v.lower, v.to_parameter(t[k] - half)) : v.lower;
     f.high95 = std::isfinite(half) ? std::min(v.upper, v.to_parameter(t[k] + half)) : v.upper;
     if (!std::isfinite(f.sigma)) f.sigma = std::numeric_limits<double>::quiet_NaN();
@@ -214,7 +217,10 @@ std::string which_are_wider(const Identifiability& found, const std::vector<FitV
   std::string list;
   for (int k = 0; k < static_cast<int>(variables.size()); ++k) {
     const double ratio = found.widened_by_misfit(k);
-    if (ratio > 1) list += (list.empty() ? "" : ", ") + variables[k].name + number(" %.2f times", ratio);
+    if (ratio > 1 + 1e-9)
+      list += (list.empty() ? "" : ", ") + variables[k].name + number(" %.2f times", ratio) +
+              number(" on %.3g degrees of freedom",
+                     found.degrees(VectorXd::Unit(static_cast<Eigen::Index>(variables.size()), k)));
   }
   return list.empty() ? "nowhere here" : "here " + list;
 }
@@ -284,12 +290,11 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
   if (linearised) {
     const NoiseCheck noise = check_noise(problem, *at, linearised->residuals);
     result.reduced_chi_square = noise.reduced_chi_square;
-    const double quantile = student_quantile_975(problem.degrees_of_freedom());
     const std::vector<FitVariable>& variables = problem.parametrisation().variables();
-    const Identifiability found(linearised->jacobian, variables, noise.widening,
-                                common_misfit(problem, *linearised, quantile));
-    add_parameters(problem, t, &found, quantile, truth, result);
-    add_modulus_ratios(problem, found, t, quantile, truth, result);
+    const Identifiability found(linearised->jacobian, variables, noise.widening, problem.degrees_of_freedom(),
+                                whitened_tracks(problem, *linearised));
+    add_parameters(problem, t, &found, truth, result);
+    add_modulus_ratios(problem, found, t, truth, result);
     result.singular_values = found.singular_values();
     result.right_vectors = found.right_vectors();
     result.correlation = found.correlation();
@@ -303,7 +308,7 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
                            "), or what neighbouring tracks err alike where that is more (" +
                            which_are_wider(found, variables) + ").");
   } else {
-    add_parameters(problem, t, nullptr, 0, truth, result);
+    add_parameters(problem, t, nullptr, truth, result);
     result.notes.push_back("No intervals: the run at the last values could not be differentiated.");
   }
   result.forward_runs = problem.counters().forward_runs;

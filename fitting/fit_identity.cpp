@@ -42,6 +42,7 @@ std::string tracks_digest(const TrackSet& tracks) {
       if (o.status != TrackStatus::ok) continue;
       d.matrix(o.pixel);
       d.matrix(o.covariance);
+      d.number(o.renewed ? 1 : 0);
     }
   }
   return d.hex();

@@ -84,16 +84,16 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
     const Track& track = tracks.tracks[r.track];
     check_times(track, options_.frame_rate);
     ComparedTrack compared{r.track, track.at(0)->pixel, {}, {}};
-    std::vector<Eigen::Matrix2d> covariances;
+    std::vector<const Observation*> used_observations;
     for (const Observation& o : track.observations) {
       if (o.status != TrackStatus::ok || o.frame < first || o.frame > options_.frames) continue;
       compared.frames.push_back(o.frame);
       compared.observed.push_back(o.pixel);
-      covariances.push_back(with_floor(o.covariance, floor));
+      used_observations.push_back(&o);
     }
     if (compared.frames.empty()) continue;
     num_observations_ += static_cast<int>(compared.frames.size());
-    noise_.emplace_back(with_floor(track.at(0)->covariance, floor), covariances, fit.robust_scale);
+    noise_.emplace_back(track, used_observations, floor, fit.robust_scale);
     compared_.push_back(std::move(compared));
     used.push_back(r);
   }

@@ -14,7 +14,9 @@ struct FittedParameter {
   std::string address, name, unit, transform;           ///< transform: none | log | logit
   double initial = 0, value = 0, lower = 0, upper = 0;  ///< internal units
   double sigma = 0;  ///< standard deviation in the transformed parameter (log: relative); NaN = undetermined
-  double low95 = 0, high95 = 0;  ///< 95 % interval in the parameter itself, internal units
+  /// 95 % interval in the parameter itself, internal units: a quantile of Student's t times sigma on either
+  /// side, with the degrees of freedom that sigma has.
+  double low95 = 0, high95 = 0;
   bool at_bound = false, determined = true;
   std::optional<double> truth;  ///< known in twin experiments
 };
@@ -56,7 +58,7 @@ struct FitResult {
   std::vector<FitIteration> history;
   VectorXd singular_values;              ///< of the whitened Jacobian by transformed parameters, descending
   MatrixXd right_vectors;                ///< [parameters][parameters] columns belong to singular_values
-  MatrixXd correlation;                  ///< [parameters][parameters]
+  MatrixXd correlation;                  ///< [parameters][parameters] of the covariance that sigma is from
   std::vector<std::string> cannot_tell;  ///< sentences: what the footage does not determine
   std::vector<std::string> notes;        ///< schemes, settings, warnings
   std::vector<FitResidual> residuals;

@@ -1,11 +1,11 @@
 #include "fitting/identifiability.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 #include "sim/core/error.h"
@@ -27,29 +27,39 @@ std::string format(const char* pattern, double x) {
   return text;
 }
 
-/// Up to here the finite sum for whole degrees of freedom is used; beyond, an expansion errs by less than
-/// 1e-7.
-constexpr int kExactStudent = 100;
+/// Beyond so many degrees of freedom an expansion errs by less than 1e-7.
+constexpr double kExactStudent = 100;
 
-/// P(|T| <= t) of Student's t with v degrees of freedom (Abramowitz and Stegun 26.7.3, 26.7.4).
-double student_within(double t, int v) {
-  const double theta = std::atan(t / std::sqrt(v)), c = std::cos(theta), s = std::sin(theta);
-  const bool is_odd = v % 2 == 1;
-  // Odd: cos + 2/3 cos³ + 2·4/(3·5) cos⁵ ... to cos^(v−2); even: 1 + 1/2 cos² + 1·3/(2·4) cos⁴ ... to the
-  // same.
-  double term = is_odd ? c : 1, sum = 0;
-  for (int power = is_odd ? 1 : 0; power <= v - 2; power += 2) {
-    sum += term;
-    term *= c * c * (power + 1) / (power + 2);
+/// P(|T| <= t) of Student's t with v >= 1 degrees of freedom: with t = √v tan θ the density is
+/// cos^(v−1) θ / B(v/2, 1/2) on both sides, integrated by Simpson's rule.
+double student_within(double t, double v) {
+  constexpr int panels = 400;
+  const double end = std::atan(t / std::sqrt(v)), step = end / panels;
+  double sum = 0;
+  for (int i = 0; i <= panels; ++i) {
+    const double weight = i == 0 || i == panels ? 1 : i % 2 == 1 ? 4 : 2;
+    sum += weight * std::pow(std::cos(i * step), v - 1);
   }
-  return is_odd ? 2 / std::numbers::pi * (theta + s * sum) : s * sum;
+  return 2 * sum * step / 3 / std::beta(0.5 * v, 0.5);
+}
+
+/// How many singular values, descending, are not zero.
+int rank_of(const VectorXd& singular_values) {
+  int rank = 0;
+  while (rank < singular_values.size() && singular_values[rank] > kNullTolerance * singular_values[0]) ++rank;
+  return rank;
 }
 
 }  // namespace
 
 Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<FitVariable>& variables,
-                                 double widening, const MatrixXd& misfit)
-    : variables_(variables), scale_(VectorXd::Ones(jacobian.cols())), widening_(widening) {
+                                 double widening, int degrees_of_freedom,
+                                 const std::vector<WhitenedTrack>& tracks)
+    : variables_(variables),
+      scale_(VectorXd::Ones(jacobian.cols())),
+      misfit_({}, MatrixXd()),
+      widening_(widening),
+      degrees_of_freedom_(degrees_of_freedom) {
   const int n = static_cast<int>(jacobian.cols());
   require(n == static_cast<int>(variables.size()), "Identifiability: one variable per column");
   require(jacobian.rows() >= n && jacobian.allFinite(), "Identifiability: Jacobian is wide or not finite");
@@ -60,63 +70,80 @@ Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<Fit
   singular_values_ = svd.singularValues();
   right_vectors_ = svd.matrixV();
   for (int i = 0; i < n; ++i) {
-    if (singular_values_[i] > kNullTolerance * singular_values_[0]) ++rank_;
     Eigen::Index largest;  // the sign of a singular vector is free: make its largest component positive
     right_vectors_.col(i).cwiseAbs().maxCoeff(&largest);
     if (right_vectors_(largest, i) < 0) right_vectors_.col(i) *= -1;
   }
-  if (misfit.size() == 0) return;
-  require(misfit.rows() == n && misfit.cols() == n, "Identifiability: misfit by the parameters");
-  const MatrixXd v = scale_.asDiagonal() * right_vectors_;
-  misfit_ = v.transpose() * misfit * v;
+  rank_ = rank_of(singular_values_);
+  basis_ = scale_.asDiagonal() * right_vectors_.leftCols(rank_) *
+           singular_values_.head(rank_).cwiseInverse().asDiagonal();
+  misfit_ = SpatialMisfit(tracks, basis_);
+  if (rank_ == 0) return;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(misfit_.covariance());
+  directions_ = eigen.eigenvectors();
+  variances_ = eigen.eigenvalues().cwiseMax(widening * widening);
 }
 
-std::pair<double, double> Identifiability::deviations(const VectorXd& g) const {
-  const VectorXd part = right_vectors_.transpose() * scale_.cwiseProduct(g);
-  VectorXd by_noise = VectorXd::Zero(part.size()), by_misfit = by_noise;
-  for (int i = 0; i < part.size(); ++i) {
-    if (i < rank_) {
-      by_noise[i] = part[i] / singular_values_[i];
-      by_misfit[i] = by_noise[i] / singular_values_[i];
-    } else if (std::fabs(part[i]) > 1e-6 * scale_.cwiseProduct(g).norm()) {
-      return {kInfinity, kInfinity};
-    }
-  }
-  const double noise = widening_ * by_noise.norm();
-  if (misfit_.size() == 0) return {noise, 0};
-  return {noise, std::sqrt(std::max(0.0, by_misfit.dot(misfit_ * by_misfit)))};
+bool Identifiability::is_open(const VectorXd& g) const {
+  const VectorXd scaled = scale_.cwiseProduct(g);
+  const VectorXd null_part = right_vectors_.rightCols(scale_.size() - rank_).transpose() * scaled;
+  return null_part.size() > 0 && null_part.cwiseAbs().maxCoeff() > 1e-6 * scaled.norm();
 }
 
 double Identifiability::sigma(const VectorXd& g) const {
-  const auto [noise, misfit] = deviations(g);
-  return std::max(noise, misfit);
-}
-
-double Identifiability::widened_by_misfit(int parameter) const {
-  const auto [noise, misfit] = deviations(VectorXd::Unit(scale_.size(), parameter));
-  return misfit > noise ? misfit / noise : 1;
+  if (is_open(g)) return kInfinity;
+  const VectorXd along = directions_.transpose() * (basis_.transpose() * g);
+  return std::sqrt(along.cwiseAbs2().dot(variances_));
 }
 
 double Identifiability::sigma(int parameter) const {
   return sigma(VectorXd::Unit(scale_.size(), parameter));
 }
 
+double Identifiability::degrees(const VectorXd& g) const {
+  if (is_open(g)) return 1;
+  const VectorXd y = basis_.transpose() * g, along = directions_.transpose() * y;
+  double by_noise = 0, by_misfit = 0;
+  for (int i = 0; i < rank_; ++i)
+    (variances_[i] > widening_ * widening_ ? by_misfit : by_noise) += along[i] * along[i] * variances_[i];
+  const double total = by_noise + by_misfit;
+  if (!(by_misfit > 0)) return std::max(1, degrees_of_freedom_);
+  return total * total /
+         (by_misfit * by_misfit / misfit_.degrees(y) +
+          by_noise * by_noise / std::max(1, degrees_of_freedom_));
+}
+
+double Identifiability::half_width(const VectorXd& g) const {
+  return student_quantile_975(degrees(g)) * sigma(g);
+}
+
+double Identifiability::half_width(int parameter) const {
+  return half_width(VectorXd::Unit(scale_.size(), parameter));
+}
+
+double Identifiability::widened_by_misfit(int parameter) const {
+  const VectorXd g = VectorXd::Unit(scale_.size(), parameter);
+  return is_open(g) ? 1 : sigma(g) / (widening_ * (basis_.transpose() * g).norm());
+}
+
 MatrixXd Identifiability::correlation() const {
   const Eigen::Index n = scale_.size();
-  MatrixXd covariance = MatrixXd::Zero(n, n);
-  for (int i = 0; i < rank_; ++i)
-    covariance +=
-        right_vectors_.col(i) * right_vectors_.col(i).transpose() / std::pow(singular_values_[i], 2);
+  const MatrixXd root = basis_ * directions_ * variances_.cwiseSqrt().asDiagonal();
+  const MatrixXd covariance = root * root.transpose();
   MatrixXd result = MatrixXd::Identity(n, n);
   for (Eigen::Index a = 0; a < n; ++a)
     for (Eigen::Index b = 0; b < n; ++b) {
       if (a == b) continue;
-      const bool finite =
-          std::isfinite(sigma(static_cast<int>(a))) && std::isfinite(sigma(static_cast<int>(b)));
+      const bool finite = !is_open(VectorXd::Unit(n, a)) && !is_open(VectorXd::Unit(n, b));
       result(a, b) = finite ? covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b))
                             : std::numeric_limits<double>::quiet_NaN();
     }
   return result;
+}
+
+double Identifiability::deviation_along(int i) const {
+  const VectorXd along = directions_.row(i).transpose();
+  return std::sqrt(along.cwiseAbs2().dot(variances_)) / singular_values_[i];
 }
 
 bool Identifiability::determined(int parameter) const {
@@ -143,10 +170,10 @@ std::string Identifiability::direction_in_words(int i) const {
     ++mentioned;
   }
   if (more > 0) (down.empty() ? up : down) += " and " + std::to_string(more) + " more";
-  const std::string effect = i >= rank_ ? " changes no tracked feature."
-                                        : " by 10 % changes all tracked features together by only " +
-                                              format("%.2g", 0.1 * singular_values_[i] / widening_) +
-                                              " standard deviations.";
+  const std::string effect = i >= rank_
+                                 ? " changes no tracked feature."
+                                 : " by 10 % changes all tracked features together by only " +
+                                       format("%.2g", 0.1 / deviation_along(i)) + " standard deviations.";
   if (mentioned == 1) return up + " is not determined: changing it" + effect;
   if (down.empty()) return up + " go together: raising all of them" + effect;
   return up + " trade off against " + down + ": raising the former while lowering the latter" + effect;
@@ -155,7 +182,7 @@ std::string Identifiability::direction_in_words(int i) const {
 std::vector<std::string> Identifiability::cannot_tell() const {
   std::vector<std::string> sentences;
   for (int i = static_cast<int>(singular_values_.size()) - 1; i >= 0; --i)  // the worst first
-    if (i >= rank_ || widening_ / singular_values_[i] > 1) sentences.push_back(direction_in_words(i));
+    if (i >= rank_ || deviation_along(i) > 1) sentences.push_back(direction_in_words(i));
   for (int k = 0; k < scale_.size(); ++k) {
     if (determined(k)) continue;
     const double s = sigma(k) / scale_[k];
@@ -170,13 +197,12 @@ std::vector<std::string> Identifiability::cannot_tell() const {
   return sentences;
 }
 
-double student_quantile_975(int degrees_of_freedom) {
-  const int v = std::max(1, degrees_of_freedom);
+double student_quantile_975(double degrees_of_freedom) {
+  const double v = std::max(1.0, degrees_of_freedom);
   if (v > kExactStudent) {
     const double z = 1.959963984540054, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-    const double d = v;
-    return z + (z3 + z) / (4 * d) + (5 * z5 + 16 * z3 + 3 * z) / (96 * d * d) +
-           (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * d * d * d);
+    return z + (z3 + z) / (4 * v) + (5 * z5 + 16 * z3 + 3 * z) / (96 * v * v) +
+           (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * v * v * v);
   }
   double low = 1.9, high = 12.8;  // the quantiles of infinity and of one degree of freedom lie inside
   for (int round = 0; round < 60; ++round) {

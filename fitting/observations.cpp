@@ -22,6 +22,8 @@ constexpr std::array<std::string_view, 11> kColumns = {"frame",   "time_s", "tra
                                                        "syy_px2", "corr",   "status"};
 enum Column { frame, time_s, track_id, camera, x_px, y_px, sxx, sxy, syy, corr, status };
 
+constexpr std::string_view kRenewed = "renewed";  ///< for the status of an observation that is ok
+
 std::string header() {
   std::string line;
   for (std::string_view name : kColumns) line += (line.empty() ? "" : ",") + std::string(name);
@@ -82,7 +84,8 @@ class Row {
 TrackStatus read_status(const Row& row) {
   for (TrackStatus s : {TrackStatus::ok, TrackStatus::occluded, TrackStatus::lost, TrackStatus::outside})
     if (row.text(status) == to_string(s)) return s;
-  row.refuse(status, "ok, occluded, lost or outside");
+  if (row.text(status) == kRenewed) return TrackStatus::ok;
+  row.refuse(status, "ok, renewed, occluded, lost or outside");
 }
 
 Observation read_observation(const Row& row) {
@@ -90,6 +93,7 @@ Observation read_observation(const Row& row) {
   o.frame = row.index(frame);
   o.time_s = row.number(time_s);
   o.status = read_status(row);
+  o.renewed = row.text(status) == kRenewed;
   if (o.status != TrackStatus::ok) {
     for (int column = x_px; column <= corr; ++column)
       if (!row.text(column).empty()) row.refuse(column, "an empty field (status is not ok)");
@@ -134,6 +138,21 @@ const Observation* Track::at(int frame_index) const {
   return it != observations.end() && it->frame == frame_index ? &*it : nullptr;
 }
 
+std::vector<Eigen::Matrix2d> Track::shared_covariances() const {
+  std::vector<Eigen::Matrix2d> list;
+  Eigen::Matrix2d shared = Eigen::Matrix2d::Zero();
+  const Observation* last = nullptr;
+  for (const Observation& o : observations) {
+    if (o.status == TrackStatus::ok) {
+      if (last == nullptr) shared = o.covariance;
+      if (last != nullptr && o.renewed) shared += last->covariance;
+      last = &o;
+    }
+    list.push_back(shared);
+  }
+  return list;
+}
+
 const Track* TrackSet::find(const std::string& camera_name, int id) const {
   for (const Track& track : tracks)
     if (track.id == id && track.camera == camera_name) return &track;
@@ -169,7 +188,15 @@ TrackSet read_tracks(const std::string& path) {
   TrackSet set;
   for (const auto& [key, frames] : by_track) {
     Track track{key.second, key.first, {}};
-    for (const auto& [index, entry] : frames) track.observations.push_back(entry.first);
+    bool is_begun = false;
+    for (const auto& [index, entry] : frames) {
+      const auto& [o, number] = entry;
+      if (o.renewed && !is_begun)
+        throw InputError(path + ":" + std::to_string(number), "status 'renewed' in a track's first observation",
+                         "an ok one before it");
+      is_begun = is_begun || o.status == TrackStatus::ok;
+      track.observations.push_back(o);
+    }
     set.tracks.push_back(std::move(track));
   }
   return set;
@@ -208,7 +235,7 @@ void write_tracks(const TrackSet& set, const std::string& path) {
     } else {
       line += ",,,,,,";
     }
-    line += std::string(",") + to_string(o->status) + "\n";
+    line += "," + (o->renewed ? std::string(kRenewed) : to_string(o->status)) + "\n";
   }
   file.write(line);
   file.commit();

@@ -2,7 +2,8 @@
 //
 // File: one row per track, frame and camera; header exactly
 //   frame,time_s,track_id,camera,x_px,y_px,sxx_px2,sxy_px2,syy_px2,corr,status
-// status ok: all numbers present and finite, covariance positive definite, −1 <= corr <= 1.
+// status ok or renewed: all numbers present and finite, covariance positive definite, −1 <= corr <= 1; renewed
+// is ok in all else, and the first of those that are measured against a new template (below).
 // any other status: the six number columns x_px ... corr are empty, because nothing was measured.
 // Numbers are written so that reading gives back the same bits.
 //
@@ -13,7 +14,11 @@
 // So a displacement since the first observation has the sum of both covariances, and one between two later
 // frames f and g that of f and g. Independent errors in all frames are the case where the first is like the
 // others. The tracker puts the noise of the template into the first observation, since it is common to all
-// frames. Tests: tests/fitting/observations_test.cpp
+// frames.
+//
+// A renewed template is cut where the last ok observation before it was, so that the error of that one, g, stays in
+// all that follow: from there on pixel_f has o' ~ N(0, covariance of g) besides, once per renewal.
+// Tests: tests/fitting/observations_test.cpp
 #pragma once
 
 #include <string>
@@ -42,6 +47,7 @@ struct Observation {
   /// Of the observation's own error, or, in the first, of what is common to the track; px²; only when ok.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
   double correlation = 0;  ///< zero-mean normalised correlation with the track's template; only when ok
+  bool renewed = false;    ///< the first against a template cut at the last ok one before; only when ok
 };
 
 /// One material point followed by one camera; observations by increasing frame.
@@ -52,6 +58,9 @@ struct Track {
 
   /// The observation of `frame`, or nullptr.
   const Observation* at(int frame) const;
+  /// Per observation the covariance of what it shares with others, px²: that of the first ok one and of every
+  /// renewal up to it. Zero before the first.
+  std::vector<Eigen::Matrix2d> shared_covariances() const;
 };
 
 /// Tracks by increasing (camera, id).

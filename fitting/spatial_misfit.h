@@ -3,17 +3,24 @@
 //
 // At the optimum the scores s_i = J_iᵀ z_i of the tracks sum to zero (priors apart). Errors of the model
 // (another mesh, another finger, a missing layer) make those of neighbours point the same way, over all
-// frames. The sandwich
+// frames. The sandwich (Conley 1999, J. Econometrics 92) counts them as they come:
 //
-//   Cov = A⁻¹ B A⁻¹,   A = JᵀJ,   B = G/(G − 1) Σ_ij K(x_i − x_j) s_i s_jᵀ
+//   Cov = A⁻¹ B A⁻¹,   A = JᵀJ,   B = Σ_ij K(|x_i − x_j|) s_i s_jᵀ,   K(d) = exp(−d²/2L²)
 //
-// counts them as they come (Conley 1999, J. Econometrics 92; a track's frames fully, White 1980): K is the
-// product of two triangles of half width L = 1/3 of the tracks' extent along either axis of the picture, so
-// that B has no negative eigenvalue; G = 9 is the number of patches that are taken to err independently, and
-// Student's t has 8 degrees. In a linear problem whose model errs over an eighth of the picture's side, 60 %
-// of the intervals from the noise alone hold the truth and 86 % of these; without such errors 97 % do.
+// B is too small and rests on few independent patches: what is smooth over the picture was fitted away, and
+// what is farther apart than L is not counted. By how much follows from a reference Σ of how residuals are
+// alike (Bell and McCaffrey 2002, Survey Methodology 28; Imbens and Kolesár 2016, Rev. Econ. Stat. 98):
 //
-// Tests: tests/fitting/identifiability_test.cpp
+//   Σ_ij = σ² δ_ij + Σ_g τ_g² exp(−|x_i − x_j|²/2 l_g²)  between tracks, in each frame and axis anew,
+//
+// σ², τ_g² >= 0 from the products of residuals by distance, whose expectation under M = 1 − J A⁻¹ Jᵀ is
+// known. With B_0 = JᵀΣJ and E = E[B] under Σ, B is replaced by C B Cᵀ, C E Cᵀ = B_0, which is right on
+// average if Σ is, and a variance gᵀA⁻¹CBCᵀA⁻¹g has as many degrees of freedom as its mean and variance under
+// Σ tell (Satterthwaite 1946). L is where tr(E⁻¹B_0) is least: the least depends on Σ there.
+//
+// Only the shape of Σ matters, not its size. The last two steps are what makes intervals hold on patches that
+// are narrow or small against the length over which errors are alike; fitting/README.md has the figures.
+// Tests: tests/fitting/spatial_misfit_test.cpp
 #pragma once
 
 #include <vector>
@@ -22,14 +29,49 @@
 
 namespace rhytid::fitting {
 
-/// Patches along either axis of the picture whose errors are taken to be independent.
-inline constexpr int kMisfitPatches = 3;
-/// Degrees of freedom of an interval that rests on them.
-inline constexpr int kMisfitDegrees = kMisfitPatches * kMisfitPatches - 1;
+/// One track, whitened, at the optimum.
+struct WhitenedTrack {
+  Vec2 pixel;             ///< in frame 0
+  std::vector<int> rows;  ///< which quantities its rows are: the same number in another track is the same
+                          ///< frame and axis; not negative
+  MatrixXd jacobian;      ///< [rows][parameters]
+  VectorXd residuals;     ///< [rows]
+};
 
-/// B above, by t. `scores` [parameters][tracks], `pixels` of the tracks in frame 0. Zero, that is no
-/// statement, when all tracks stand on one row or column of the picture. Throws ContractError when the
-/// numbers of tracks differ.
-MatrixXd spatial_score_covariance(const MatrixXd& scores, const std::vector<Vec2>& pixels);
+/// The corrected sandwich in coordinates in which A is the identity.
+class SpatialMisfit {
+ public:
+  /// `basis` [parameters][rank] with basisᵀ A basis = 1: columns of parameters that change all residuals
+  /// together by one. No statement, a covariance of zero, where all tracks are at one place or as few as the
+  /// parameters. Beyond 1500 tracks every second, third, ... is used, which can only widen.
+  SpatialMisfit(const std::vector<WhitenedTrack>& tracks, const MatrixXd& basis);
+
+  /// C B Cᵀ [rank][rank]: the covariance of the coordinates.
+  const MatrixXd& covariance() const { return covariance_; }
+  /// Degrees of freedom of gᵀ covariance() g, g [rank]; at least one.
+  double degrees(const VectorXd& g) const;
+  double kernel_width() const { return kernel_width_; }  ///< L, px; 0 = no statement
+
+ private:
+  /// Σ_k weights_ik J_k in the rows in which track i is seen, laid out as jacobian_.
+  MatrixXd smoothed_jacobian(const MatrixXd& weights) const;
+  /// Σ_ij weights_ij J_iᵀ J_j over the rows in which both are seen [rank][rank].
+  MatrixXd weighted_normal(const MatrixXd& weights) const;
+  void fit_reference(const MatrixXd& distances);
+  void choose_kernel(const MatrixXd& distances);
+  /// Σ over pairs (i, j) of `kernel` times E[s_i s_jᵀ].
+  MatrixXd expected_sum(const MatrixXd& kernel) const;
+
+  Eigen::Index rank_ = 0;
+  MatrixXd jacobian_;         ///< [tracks][rows · rank], zero where a track is not seen
+  MatrixXd residuals_;        ///< [tracks][rows]
+  MatrixXd seen_;             ///< [tracks][rows], one or zero
+  MatrixXd reference_;        ///< Σ [tracks][tracks]
+  MatrixXd reference_sum_;    ///< B_0 [rank][rank]
+  MatrixXd own_, neighbour_;  ///< per track A_i and Σ_k Σ_ki J_kᵀJ_i, [tracks][rank · rank]
+  MatrixXd to_own_;           ///< from coordinates in which A of the tracks used is 1 to those asked for
+  MatrixXd kernel_, correction_, covariance_;
+  double kernel_width_ = 0;
+};
 
 }  // namespace rhytid::fitting

@@ -157,8 +157,7 @@ Measurement search(const Follower& f, const PatchWarp& expected, const FrameView
 void accept(const Measurement& m, const ResidualCorrelation& correlation, const FrameView& view,
             Follower* f) {
   if (m.from_previous) {
-    f->inherited = f->covariance;
-    f->renewed = f->renewed || f->common.has_value();  // a template cut in the first frame is the first again
+    f->renewed = f->common.has_value();  // a template cut in the first frame is the first again
     f->template_gradient = f->warp.gradient * f->template_gradient;
     f->patch = m.new_patch;
     f->baseline = 0;
@@ -168,13 +167,13 @@ void accept(const Measurement& m, const ResidualCorrelation& correlation, const 
   if (f->baseline == 0) f->baseline = std::max(f->residual, view.least_residual);
   f->warp = m.alignment.warp;
   // Half of the residual's noise is the template's, which all frames share, half the frame's own. The
-  // position of a renewed template is as uncertain as the frame it was cut from, and its noise counts as the
-  // frames' own.
+  // position of a renewed template is as uncertain as the frame it was cut from; the readers of the track know
+  // (observations.h).
   const Eigen::Matrix2d both =
       correlation.covariance(m.alignment, std::max(f->residual, view.least_residual));
   if (!f->common) f->common = 0.5 * both;
   f->with_itself.reset();
-  f->covariance = f->renewed ? Eigen::Matrix2d(f->inherited + both) : Eigen::Matrix2d(0.5 * both);
+  f->covariance = 0.5 * both;
   f->active = true;
 }
 

@@ -21,8 +21,7 @@ struct Follower {
   /// Covariance of what all frames err alike: the noise of the first template as its alignments felt it, px².
   std::optional<Eigen::Matrix2d> common;
   std::optional<Alignment> with_itself;                 ///< of the first template, until `common` is known
-  Eigen::Matrix2d inherited = Eigen::Matrix2d::Zero();  ///< own covariance when the template was renewed, px²
-  bool renewed = false;                                 ///< the template is not of the first frame
+  bool renewed = false;  ///< the template is newer than the last recorded observation
   Eigen::Matrix2d template_gradient =
       Eigen::Matrix2d::Identity();                       ///< deformation from first frame to template
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< own, in the last ok frame, px²

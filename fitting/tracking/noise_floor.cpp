@@ -30,9 +30,14 @@ NoiseFloor measure_noise_floor(const TrackSet& tracks, int first_frame, int last
     const Observation* start = t.at(first_frame);
     if (start == nullptr || start->status != TrackStatus::ok) continue;
     std::vector<Sample> samples;
-    for (const Observation& o : t.observations) {
+    const std::vector<Eigen::Matrix2d> shared = t.shared_covariances();
+    const Eigen::Matrix2d before = shared[start - t.observations.data()];
+    // What the first frame errs by itself, or as the definition of the point.
+    const Eigen::Matrix2d own = start->covariance;
+    for (std::size_t i = 0; i < t.observations.size(); ++i) {
+      const Observation& o = t.observations[i];
       if (o.frame <= first_frame || o.frame > last_frame || o.status != TrackStatus::ok) continue;
-      samples.push_back({o.frame, o.pixel - start->pixel, start->covariance + o.covariance});
+      samples.push_back({o.frame, o.pixel - start->pixel, own + shared[i] - before + o.covariance});
     }
     if (samples.size() < 3) continue;
     for (const Sample& s : samples)

@@ -236,7 +236,6 @@ class Run {
       PatchTemplate fresh = cut_template(image, f.warp.centre, o_.window_px / 2);
       if (fresh.values.empty()) continue;
       f.patch = std::move(fresh);
-      f.inherited = f.covariance;
       f.renewed = true;
       f.template_gradient = f.warp.gradient * f.template_gradient;
       f.warp.gradient.setIdentity();
@@ -281,6 +280,8 @@ class Run {
       observation.pixel = f->warp.centre;
       observation.covariance = f->covariance;
       observation.correlation = correlation;
+      observation.renewed = f->renewed;
+      f->renewed = false;
     }
     f->track.observations.push_back(observation);
     switch (status) {
@@ -310,11 +311,12 @@ class Run {
       // A point that was never seen again has no residuals of its own and is given typical ones.
       if (!f.common) f.common = 0.5 * correlation_.covariance(*f.with_itself, typical);
       list[0].covariance = *f.common;
+      const std::vector<Eigen::Matrix2d> shared = f.track.shared_covariances();
       bool unbroken = true;
       for (const Observation& o : list) {
         unbroken = unbroken && o.status == TrackStatus::ok;
         if (&o != list.data() && o.status == TrackStatus::ok)
-          sigmas.push_back(std::sqrt((*f.common + o.covariance).trace() / 2));
+          sigmas.push_back(std::sqrt((shared[&o - list.data()] + o.covariance).trace() / 2));
       }
       report_.kept += f.active;
       report_.unbroken += unbroken;

@@ -11,7 +11,6 @@
 #include <numeric>
 #include <random>
 
-#include "fitting/spatial_misfit.h"
 #include "fitting/track_noise.h"
 
 namespace rhytid::fitting {
@@ -44,21 +43,59 @@ MatrixXd random_matrix(int rows, int cols, double scale) {
 TEST(Identifiability, AgreesWithTheInverseNormalMatrix) {
   const MatrixXd j = random_matrix(50, 3, 10);
   const MatrixXd covariance = (j.transpose() * j).inverse();
-  const Identifiability found(j, variables({"a", "b", "c"}), 1.5);
+  const Identifiability found(j, variables({"a", "b", "c"}), 1.5, 47);
   EXPECT_EQ(found.rank(), 3);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(found.sigma(k), 1.5 * std::sqrt(covariance(k, k)), 1e-12);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(found.sigma(k), 1.5 * std::sqrt(covariance(k, k)), 1e-12);
+    EXPECT_NEAR(found.half_width(k), student_quantile_975(47) * found.sigma(k), 1e-12);
+  }
   EXPECT_NEAR(found.correlation()(0, 2), covariance(0, 2) / std::sqrt(covariance(0, 0) * covariance(2, 2)),
               1e-12);
   EXPECT_TRUE(found.cannot_tell().empty());
-  // The sandwich by hand, where it is more and where it is less than the noise.
-  const MatrixXd scores = random_matrix(3, 20, 1), b = scores * scores.transpose();
-  const MatrixXd sandwich = covariance * b * covariance;
-  for (const double size : {1e3, 1e-3}) {
-    const Identifiability both(j, variables({"a", "b", "c"}), 1.5, size * size * b);
-    for (int k = 0; k < 3; ++k) {
-      const double noise = found.sigma(k), misfit = size * std::sqrt(sandwich(k, k));
-      EXPECT_NEAR(both.sigma(k), std::max(noise, misfit), 1e-10 * std::max(noise, misfit));
-      EXPECT_NEAR(both.widened_by_misfit(k), std::max(1.0, misfit / noise), 1e-9 * both.widened_by_misfit(k));
+}
+
+// One matrix for deviations and correlations: nowhere below the noise's or the misfit's, and theirs where one
+// of them is everywhere more. Quantiles belong to intervals and not to deviations.
+TEST(Identifiability, OneCovarianceOfNoiseAndMisfit) {
+  constexpr int kTracks = 50, kParameters = 3;
+  const MatrixXd j = random_matrix(kTracks, kParameters, 10);
+  const auto names = variables({"a", "b", "c"});
+  const auto tracks = [&](double size) {
+    std::mt19937 rng(8);
+    std::normal_distribution<double> normal;
+    std::vector<WhitenedTrack> list;
+    for (int i = 0; i < kTracks; ++i)
+      list.push_back({Vec2(i % 7, i / 7), {0}, j.row(i), VectorXd::Constant(1, size * normal(rng))});
+    return list;
+  };
+  const Identifiability noise(j, names, 1.5, 47);
+  EXPECT_LT((noise.basis().transpose() * j.transpose() * j * noise.basis() - Mat3::Identity()).norm(), 1e-12);
+  const MatrixXd by_noise = 2.25 * (j.transpose() * j).inverse();
+  for (const double size : {1e3, 1.5, 1e-3}) {
+    const Identifiability both(j, names, 1.5, 47, tracks(size));
+    const SpatialMisfit misfit(tracks(size), noise.basis());
+    const MatrixXd by_misfit = noise.basis() * misfit.covariance() * noise.basis().transpose();
+    MatrixXd covariance = both.correlation();
+    for (int a = 0; a < kParameters; ++a)
+      for (int b = 0; b < kParameters; ++b) covariance(a, b) *= both.sigma(a) * both.sigma(b);
+    const VectorXd any = Vec3(0.3, -0.5, 0.8);  // a direction: the same matrix again
+    EXPECT_NEAR(both.sigma(any), std::sqrt(any.dot(covariance * any)), 1e-12 * size + 1e-13);
+    for (const MatrixXd& part : {by_noise, by_misfit})
+      EXPECT_GT((covariance - part).selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(),
+                -1e-12 * covariance.norm());
+    if (size == 1.5) {
+      EXPECT_GT((covariance - by_noise).norm(), 0.01 * covariance.norm());
+      EXPECT_GT((covariance - by_misfit).norm(), 0.01 * covariance.norm());
+      continue;
+    }
+    EXPECT_LT((covariance - (size > 1 ? by_misfit : by_noise)).norm(), 1e-10 * covariance.norm());
+    for (int k = 0; k < kParameters; ++k) {
+      const VectorXd g = VectorXd::Unit(kParameters, k);
+      const double degrees = size > 1 ? misfit.degrees(noise.basis().transpose() * g) : 47;
+      EXPECT_NEAR(both.degrees(g), degrees, 1e-9 * degrees);
+      EXPECT_NEAR(both.half_width(k), student_quantile_975(degrees) * both.sigma(k),
+                  1e-9 * both.half_width(k));
+      EXPECT_NEAR(both.widened_by_misfit(k), size > 1 ? both.sigma(k) / noise.sigma(k) : 1, 1e-9 * size);
     }
   }
 }
@@ -66,7 +103,7 @@ TEST(Identifiability, AgreesWithTheInverseNormalMatrix) {
 TEST(Identifiability, NamesAnExactTradeOffAndKeepsTheRatio) {
   MatrixXd j = random_matrix(50, 3, 10);
   j.col(1) = -j.col(0);  // a and b scaled together change nothing
-  const Identifiability found(j, variables({"a", "b", "c"}), 1);
+  const Identifiability found(j, variables({"a", "b", "c"}), 1, 40);
   EXPECT_EQ(found.rank(), 2);
   EXPECT_TRUE(std::isinf(found.sigma(0)));
   EXPECT_TRUE(std::isfinite(found.sigma(2)));
@@ -83,7 +120,7 @@ TEST(Identifiability, NamesAnExactTradeOffAndKeepsTheRatio) {
 TEST(Identifiability, WeakDirectionIsAStatementNotAnError) {
   MatrixXd j = random_matrix(50, 2, 10);
   j.col(1) = j.col(0) + 1e-3 * j.col(1);
-  const Identifiability found(j, variables({"soft modulus", "ligament k"}), 1);
+  const Identifiability found(j, variables({"soft modulus", "ligament k"}), 1, 40);
   EXPECT_EQ(found.rank(), 2);
   EXPECT_FALSE(found.determined(1));
   EXPECT_THAT(found.cannot_tell().at(0), HasSubstr("trade off against"));
@@ -96,7 +133,7 @@ TEST(Identifiability, DirectionsOfManyParametersHaveNames) {
   const MatrixXd j = any - (any * common) * common.transpose();
   std::vector<std::string> names;
   for (int k = 0; k < n; ++k) names.push_back("p" + std::to_string(k));
-  const Identifiability found(j, variables(names), 1);
+  const Identifiability found(j, variables(names), 1, 40);
   EXPECT_EQ(found.rank(), n - 1);
   EXPECT_THAT(found.cannot_tell().at(0),
               testing::AllOf(HasSubstr("p"), HasSubstr(" and 17 more go together")));
@@ -146,18 +183,16 @@ TEST(Identifiability, IntervalsHoldTheTruthAsOftenAsTheySay) {
       std::iota(frames.begin(), frames.end(), 1);
       const double squares = z.squaredNorm() / dof;
       const double rho = lag_one_autocorrelation(innovations, std::vector<std::vector<int>>(kTracks, frames));
-      const double quantile = student_quantile_975(dof);
-      MatrixXd scores(kParameters, kTracks);
-      std::vector<Vec2> pixels;
+      std::vector<WhitenedTrack> tracks;
       const int rows = noise.num_rows();
-      for (int i = 0; i < kTracks; ++i) {
-        scores.col(i) = j.middleRows(i * rows, rows).transpose() * z.segment(i * rows, rows);
-        pixels.emplace_back(i % 6, i / 6);
-      }
-      const double ratio = student_quantile_975(kMisfitDegrees) / quantile;
-      const Identifiability found(j, variables({"a", "b", "c"}), interval_widening(squares, rho),
-                                  ratio * ratio * spatial_score_covariance(scores, pixels));
-      for (int k = 0; k < kParameters; ++k) inside += std::fabs(t[k]) <= quantile * found.sigma(k);
+      std::vector<int> numbers(rows);
+      std::iota(numbers.begin(), numbers.end(), 0);
+      for (int i = 0; i < kTracks; ++i)
+        tracks.push_back(
+            {Vec2(i % 6, i / 6), numbers, j.middleRows(i * rows, rows), z.segment(i * rows, rows)});
+      const Identifiability found(j, variables({"a", "b", "c"}), interval_widening(squares, rho), dof,
+                                  tracks);
+      for (int k = 0; k < kParameters; ++k) inside += std::fabs(t[k]) <= found.half_width(k);
       chi += squares / kRepeats;
       width += interval_widening(squares, rho) / kRepeats;
     }
@@ -182,6 +217,8 @@ TEST(Identifiability, StudentQuantiles) {
   EXPECT_NEAR(student_quantile_975(100), 1.983971519, 1e-8);
   EXPECT_NEAR(student_quantile_975(120), 1.979930405, 1e-7);
   EXPECT_NEAR(student_quantile_975(100000), 1.95998, 1e-4);
+  EXPECT_NEAR(student_quantile_975(1.5), 6.0166631, 1e-6);  // between, by integrating the density
+  EXPECT_NEAR(student_quantile_975(6.3), 2.4189428, 1e-6);
 }
 
 TEST(Identifiability, AutocorrelationOfAnAutoregressiveProcess) {
@@ -203,71 +240,6 @@ TEST(Identifiability, AutocorrelationOfAnAutoregressiveProcess) {
   for (auto& list : frames)
     for (int& f : list) f *= 2;  // no neighbours
   EXPECT_EQ(lag_one_autocorrelation(series, frames), 0);
-}
-
-// Errors of a model are alike at neighbouring points: a smooth random field besides the noise. Intervals from
-// the noise alone then hold the truth too seldom.
-TEST(Identifiability, NeighboursThatErrAlikeWidenTheIntervals) {
-  constexpr int kSide = 14, kTracks = kSide * kSide, kParameters = 3, kRepeats = 400, kWaves = 60;
-  constexpr double kField = 1, kLength = 0.12;  // in standard deviations of the noise; of the picture's side
-  std::mt19937 rng(6);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> phase(0, 2 * 3.141592653589793);
-  int by_noise = 0, by_both = 0;
-  for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    std::vector<Vec2> pixels;
-    for (int i = 0; i < kTracks; ++i)
-      pixels.emplace_back(double(i % kSide) / kSide, double(i / kSide) / kSide);
-    // Gaussian fields with covariance exp(−d²/2L²), as sums of random waves: sensitivities and the model's
-    // error.
-    const auto field = [&](double length) {
-      VectorXd values = VectorXd::Zero(kTracks);
-      for (int w = 0; w < kWaves; ++w) {
-        const Vec2 wave(normal(rng) / length, normal(rng) / length);
-        const double shift = phase(rng);
-        for (int i = 0; i < kTracks; ++i)
-          values[i] += std::sqrt(2. / kWaves) * std::cos(wave.dot(pixels[i]) + shift);
-      }
-      return values;
-    };
-    MatrixXd j(kTracks, kParameters);
-    for (int k = 0; k < kParameters; ++k) j.col(k) = field(0.25);
-    VectorXd z = kField * field(kLength);
-    for (double& x : z) x += normal(rng);
-    const VectorXd t = j.householderQr().solve(z);  // the truth is 0
-    const VectorXd left = z - j * t;
-    const int dof = kTracks - kParameters;
-    const double widening = interval_widening(left.squaredNorm() / dof, 0),
-                 quantile = student_quantile_975(dof);
-    const double ratio = student_quantile_975(kMisfitDegrees) / quantile;
-    const MatrixXd scores = j.transpose() * left.asDiagonal();
-    const auto names = variables({"a", "b", "c"});
-    const Identifiability noise(j, names, widening),
-        both(j, names, widening, ratio * ratio * spatial_score_covariance(scores, pixels));
-    for (int k = 0; k < kParameters; ++k) {
-      by_noise += std::fabs(t[k]) <= quantile * noise.sigma(k);
-      by_both += std::fabs(t[k]) <= quantile * both.sigma(k);
-    }
-  }
-  const double total = kRepeats * kParameters;
-  std::printf(
-      "%.1f %% of intervals from the noise alone hold the truth, %.1f %% of those that see neighbours\n",
-      100 * by_noise / total, 100 * by_both / total);
-  EXPECT_LT(by_noise / total, 0.75);
-  EXPECT_GT(by_both / total, 0.82);
-}
-
-TEST(SpatialMisfit, IsASumOverPairsThatNeverTurnsNegative) {
-  const MatrixXd scores = random_matrix(3, 40, 1);
-  std::vector<Vec2> pixels;
-  for (int i = 0; i < 40; ++i) pixels.emplace_back((7 * i) % 40, (11 * i) % 37);
-  const MatrixXd b = spatial_score_covariance(scores, pixels);
-  EXPECT_GE(b.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), 0);
-  // Far apart, tracks count each for itself.
-  const std::vector<Vec2> far = {Vec2(0, 0), Vec2(100, 0), Vec2(0, 100), Vec2(100, 100)};
-  const MatrixXd four = scores.leftCols(4), sum = four * four.transpose();
-  EXPECT_LT((spatial_score_covariance(four, far) - 9. / 8 * sum).norm(), 1e-13 * sum.norm());
-  EXPECT_EQ(spatial_score_covariance(four, std::vector<Vec2>(4, Vec2(1, 1))).norm(), 0);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fitting/evaluation_log.h"
+#include "fitting/optimise.h"
 #include "sim/output/atomic_file.h"
 #include "tests/fitting/synthetic_tracks.h"
 
@@ -221,6 +222,30 @@ TEST_F(Resume, PointWithoutDerivativeIsARefusedStep) {
   const Outcome lost = fit("log");
   EXPECT_THAT(lost.result.status,
               testing::AllOf(HasSubstr("failed"), HasSubstr("the Hessian does not factor")));
+}
+
+// The start is known from a log and every other run fails: steps shrink until the optimisers call it convergence.
+TEST_F(Resume, NoConvergenceWhereNoStepCanBeRun) {
+  const FitIdentity identity = {{"test", "of steps"}};
+  const std::string folder = (folder_ / "start").string();
+  const auto problem = [&] { return FitProblem(input_.scene, input_.options, input_.camera, input_.tracks); };
+  FitProblem sound = problem();
+  EvaluationLog log(folder, identity);
+  sound.log = &log;
+  const VectorXd start = sound.parametrisation().initial();
+  ASSERT_TRUE(sound.jacobian(start) && sound.gradient(start));
+  input_.scene.solver.max_iterations = 1;
+  input_.scene.time.max_bisections = 0;
+  for (const auto optimise : {fit_with_ceres, fit_with_nlopt}) {
+    EvaluationLog again(folder, identity);
+    FitProblem broken = problem();
+    broken.log = &again;
+    const OptimiserOutcome outcome = optimise(broken, {.max_evaluations = 300}, {});
+    EXPECT_EQ(outcome.status, OptimiserOutcome::Status::failed);
+    EXPECT_THAT(outcome.detail, HasSubstr("no step from the best point could be run: "));
+    EXPECT_EQ(outcome.t, start);
+    EXPECT_GT(broken.counters().failed_runs, 3);
+  }
 }
 
 }  // namespace

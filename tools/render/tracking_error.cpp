@@ -39,22 +39,23 @@ TrackingError tracking_error(const fitting::TrackSet& tracks, const MovingSurfac
       continue;
     }
     ++out.tracks;
-    std::vector<Eigen::Matrix2d> covariances;
+    const std::vector<Eigen::Matrix2d> shared = track.shared_covariances();
+    std::vector<const Observation*> used;
     std::vector<double> errors;
     for (auto o = first + 1; o != track.observations.end(); ++o) {
       if (!is_ok(*o)) continue;
       const Vec2 error = o->pixel - camera.project(truth.position(*point, o->frame));
       if (!error.allFinite()) continue;
       distances.push_back(error.norm());
-      chi += error.dot((first->covariance + o->covariance).inverse() * error) / 2;
-      covariances.push_back(fitting::with_floor(o->covariance, noise.min_sigma / std::sqrt(2.)));
+      const Eigen::Matrix2d covariance = shared[o - track.observations.begin()] + o->covariance;
+      chi += error.dot(covariance.inverse() * error) / 2;
+      used.push_back(&*o);
       errors.insert(errors.end(), {error.x(), error.y()});
       auto& [sum, count] = by_frame[o->frame];
       sum += error.squaredNorm(), ++count;
     }
     if (errors.empty()) continue;
-    const fitting::TrackNoise model(fitting::with_floor(first->covariance, noise.min_sigma / std::sqrt(2.)),
-                                    covariances, noise.robust_scale);
+    const fitting::TrackNoise model(track, used, noise.min_sigma / std::sqrt(2.), noise.robust_scale);
     const VectorXd r = Eigen::Map<const VectorXd>(errors.data(), static_cast<Eigen::Index>(errors.size()));
     whitened += model.weighted_residual(r, model.evaluate(r)).squaredNorm();
   }

@@ -31,8 +31,10 @@ void add_singular_values(HtmlPage& page, const FitResult& fit) {
   page.svg_figure(
       svg(chart), alt + ".",
       "Singular values of the whitened Jacobian by the transformed parameters, largest first. One over "
-      "a value is the standard deviation along its combination: a bar below 0 belongs to a combination "
-      "that the data hold no better than to ±1, for logarithms a factor of e.");
+      "a value is the standard deviation along its combination as far as the tracks' stated noise goes: a "
+      "bar "
+      "below 0 belongs to a combination that the data hold no better than to ±1, for logarithms a factor of "
+      "e. Intervals also have what the residuals show besides.");
 }
 
 void add_correlations(HtmlPage& page, const FitResult& fit) {
@@ -73,6 +75,11 @@ std::string strongest_pair(const FitResult& fit) {
          " better than either of them alone.";
 }
 
+/// Units of the combinations: parameters without a transform are scaled by their range.
+double scale(const FittedParameter& p) {
+  return p.transform == "none" ? p.upper - p.lower : 1;
+}
+
 /// What one standard deviation along a combination does to a parameter.
 std::string change_text(const FittedParameter& p, double component, double deviation) {
   const double step = component * deviation;
@@ -84,7 +91,22 @@ std::string change_text(const FittedParameter& p, double component, double devia
     const double odds = (p.value - p.lower) / (p.upper - p.value) * std::exp(step);
     return short_text(p.value, 4) + " to " + short_text(p.lower + (p.upper - p.lower) * odds / (1 + odds), 4);
   }
-  return (step < 0 ? "− " : "+ ") + readable_unit(p.value, p.unit).text(std::abs(step), 3);
+  return (step < 0 ? "− " : "+ ") + readable_unit(p.value, p.unit).text(std::abs(step) * scale(p), 3);
+}
+
+/// Standard deviation along a combination, from the same covariance as the intervals; where a parameter has
+/// no deviation, from the noise as stated.
+double deviation_along(const FitResult& fit, const VectorXd& v, double singular_value) {
+  const auto n = static_cast<Eigen::Index>(fit.parameters.size());
+  if (!(singular_value > 0) || fit.correlation.rows() != n || !fit.correlation.allFinite())
+    return 1 / singular_value;
+  VectorXd scaled(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const FittedParameter& p = fit.parameters[static_cast<size_t>(k)];
+    scaled[k] = v[k] * p.sigma / scale(p);
+  }
+  return scaled.allFinite() ? std::sqrt(std::max(0.0, scaled.dot(fit.correlation * scaled)))
+                            : 1 / singular_value;
 }
 
 void add_weakest(HtmlPage& page, const FitResult& fit) {
@@ -94,8 +116,7 @@ void add_weakest(HtmlPage& page, const FitResult& fit) {
   Eigen::Index leader = 0;
   v.cwiseAbs().maxCoeff(&leader);
   if (v[leader] < 0) v = -v;  // the sign is free: let the leading parameter rise
-  const double widening = std::sqrt(std::max(1.0, fit.reduced_chi_square));
-  const double deviation = widening / smallest;
+  const double deviation = deviation_along(fit, v, smallest);
   std::vector<size_t> order(fit.parameters.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {

@@ -73,6 +73,11 @@ TEST(Report, HoldsTheWholeFit) {
   for (const auto& p : fit.parameters)
     EXPECT_THAT(html, HasSubstr("<strong>" + short_text(p.value, 7) + "</strong>"));
   EXPECT_THAT(html, HasSubstr("left strength and right strength trade off (correlation -0.86)"));
+  // The weakest combination's deviation is of the covariance that sigma and the correlations are from.
+  VectorXd weakest = fit.right_vectors.rightCols(1);
+  for (Eigen::Index k = 0; k < weakest.size(); ++k) weakest[k] *= fit.parameters[k].sigma;
+  EXPECT_THAT(html, HasSubstr("One standard deviation along this combination is " +
+                              short_text(std::sqrt(weakest.dot(fit.correlation * weakest)), 3)));
   EXPECT_THAT(html, HasSubstr("hardly notices when left strength rises"));
   EXPECT_THAT(html,
               HasSubstr("<th scope=\"row\" class=\"t\">22</th>"));  // the track that slipped is the worst
