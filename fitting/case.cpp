@@ -31,7 +31,7 @@ RenderCase read_render(const json& j) {
 TrackCase read_track(const json& j) {
   TrackCase c;
   c.max_tracks = j["max_tracks"], c.min_distance = j["min_distance"], c.mask_finger = j["mask_finger"];
-  c.model = j["model"];
+  c.model = j["model"], c.window = j["window"];
   if (j.contains("roi")) c.roi = j["roi"].get<std::array<double, 4>>();
   return c;
 }
@@ -213,6 +213,9 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
   if (c.track.roi && ((*c.track.roi)[2] < 1 || (*c.track.roi)[3] < 1))
     throw InputError(located.where("/track/roi") + ": /track/roi", shown_json(root["track"]["roi"]),
                      "x, y, width and height with a width and a height of at least 1 px");
+  if (c.track.window % 2 == 0)
+    throw InputError(located.where("/track/window") + ": /track/window", std::to_string(c.track.window),
+                     "an odd number of px, so that the window has a middle");
   c.fit = read_fit(root["fit"]);
   if (c.fit.last_frame != 0 && c.fit.last_frame < c.fit.first_frame)
     throw InputError(located.where("/fit/last_frame") + ": /fit/last_frame", std::to_string(c.fit.last_frame),

@@ -49,6 +49,7 @@ struct TrackCase {
   std::optional<std::array<double, 4>> roi;  ///< x, y, width, height, px
   bool mask_finger = true;                   ///< drop tracks that the projected colliders of the scene cover
   std::string model = "affine";              ///< affine | translation: warp of the window about a point
+  int window = 21;                           ///< px, odd: side of the window about a point
 };
 
 struct FitCase {

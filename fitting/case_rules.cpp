@@ -126,11 +126,20 @@ std::vector<Rule> track_rules() {
        .type = RuleType::boolean,
        .fallback = c.mask_finger,
        .doc = "Whether points that a collider of the scene covers are left out there."},
+      {.pointer = "/track/window",
+       .type = RuleType::integer,
+       .fallback = c.window,
+       .min = 7,
+       .max = 201,
+       .doc =
+           "Side of the window about a point that is followed, px; odd. A small one resolves finer motion, a "
+           "large one is surer where texture is weak."},
       {.pointer = "/track/model",
        .type = RuleType::option,
        .fallback = c.model,
        .options = {"affine", "translation"},
-       .doc = "How the picture around a point may deform; translation for poor footage, as of faces."},
+       .doc = "How the picture around a point may deform; translation has less freedom and fits skin that "
+              "only shifts."},
   };
 }
 

@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
 #include <ostream>
 
 #include "fitting/tracking/overlay.h"
+#include "fitting/tracking/there_and_back.h"
 #include "sim/core/digest.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
@@ -26,11 +26,12 @@ constexpr double finger_margin_px = 4;  ///< the finger's edge is blurred and th
 
 /// A frame of the overlay video as a PNG, since not everything shows videos.
 void write_overlay_picture(const std::string& video, int frame, const std::string& path) {
-  cv::VideoCapture capture(video);
-  cv::Mat picture, last;
-  for (int i = 0; i <= frame && capture.read(picture); ++i) last = picture.clone();
+  fitting::FrameSourceOptions options;
+  options.path = video;
+  options.first = options.last = frame;
+  const std::optional<fitting::Frame> picture = fitting::FrameSource(options).next();
   std::vector<unsigned char> png;
-  if (last.empty() || !cv::imencode(".png", last, png))
+  if (!picture || !cv::imencode(".png", picture->colour, png))
     throw InputError(path, "no picture", "a readable overlay");
   write_file(path, std::string(png.begin(), png.end()));
 }
@@ -72,6 +73,18 @@ void use_camera(const fitting::Case& c, TrackJob& job) {
   job.masks_digest = masks_digest(job, scene);
 }
 
+void use_settings(const fitting::TrackCase& track, TrackJob& job) {
+  fitting::TrackerOptions& options = job.options;
+  options.seeds.max_tracks = track.max_tracks;
+  options.seeds.min_distance_px = track.min_distance;
+  options.window_px = track.window;
+  options.model = track.model == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
+  if (!track.roi) return;
+  const auto& r = *track.roi;
+  options.seeds.region = cv::Rect(static_cast<int>(r[0]), static_cast<int>(r[1]), static_cast<int>(r[2]),
+                                  static_cast<int>(r[3]));
+}
+
 void print_error(const TrackingError& error, std::ostream& out) {
   char text[400];
   std::snprintf(text, sizeof(text),
@@ -99,26 +112,26 @@ nlohmann::json track_settings(const TrackJob& job) {
           {"model", job.options.model == fitting::WarpModel::translation ? "translation" : "affine"},
           {"max_tracks", seeds.max_tracks},
           {"min_distance", seeds.min_distance_px},
+          {"window", job.options.window_px},
           {"roi", r.empty() ? nlohmann::json() : nlohmann::json({r.x, r.y, r.width, r.height})},
           {"last frame", job.footage.last}};
 }
 
+TrackJob track_job(const std::string& video, const fitting::TrackCase& track) {
+  TrackJob job;
+  job.footage.path = video;
+  use_settings(track, job);
+  return job;
+}
+
 TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
-                   Progress& progress) {
+                   Progress& progress, const std::optional<fitting::TrackCase>& asked) {
   TrackJob job;
   const std::string of_case = fitting::footage_path(c, folder);
   job.footage.path = video.empty() ? of_case : video;
   job.is_other_video = job.footage.path != of_case;
   job.noise = c.fit;
-  job.options.seeds.max_tracks = c.track.max_tracks;
-  job.options.seeds.min_distance_px = c.track.min_distance;
-  job.options.model =
-      c.track.model == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
-  if (c.track.roi) {
-    const auto& r = *c.track.roi;
-    job.options.seeds.region = cv::Rect(static_cast<int>(r[0]), static_cast<int>(r[1]),
-                                        static_cast<int>(r[2]), static_cast<int>(r[3]));
-  }
+  use_settings(c.track, job);
   // Rendered footage and its truth lie side by side; another video has nothing to do with that truth.
   const std::string motion = in(folder, "truth_motion.bin");
   std::error_code ignored;
@@ -136,6 +149,9 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
     use_camera(c, job);
   }
   job.of_case = track_settings(job);
+  if (!asked) return job;
+  use_settings(*asked, job);
+  if (job.camera && asked->window != c.track.window) use_camera(c, job);  // the windows stay on the skin
   return job;
 }
 
@@ -164,23 +180,32 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
   if (result.report.end == fitting::TrackerEnd::source_ended_early)
     progress.warning(job.footage.path + " ended after " + std::to_string(result.report.frames_processed) +
                      " of " + std::to_string(result.report.frames_asked) + " frames");
+  std::optional<fitting::ThereAndBack> returned;
+  if (job.there_and_back) {
+    progress.stage("track back", result.report.frames_processed);
+    returned = fitting::there_and_back(job.footage, result.tracks, options);
+    if (!returned) return ExitCode::interrupted;
+  }
   std::optional<TrackingError> error;
   if (camera && !job.truth_motion.empty())
     error = tracking_error(result.tracks, read_motion(job.truth_motion), *camera, job.noise);
   const nlohmann::json settings = track_settings(job);
-  nlohmann::json record = track_record(result.report, error);
+  nlohmann::json record = track_record(result.report, returned, error);
   record.update(tracks_record(footage, settings, job.of_case, job.is_other_video || settings != job.of_case));
   write_file(in(folder, "track.json"), unfinished_tracks_record().dump() + "\n");
   fitting::write_tracks(result.tracks, in(folder, "tracks.csv"));
   write_file(in(folder, "track.json"), record.dump(2) + "\n");
 
   progress.stage("drawing the tracks over the footage", 0);
+  for (const char* name : {"overlay.mp4", "overlay.avi"})  // of earlier tracks, perhaps by another encoder
+    if (fs::is_regular_file(in(folder, name))) fs::remove(in(folder, name));
   fitting::FrameSource again(job.footage);
   const fitting::OverlayReport overlay =
       fitting::write_overlay(again, result.tracks, options.camera, in(folder, "overlay.mp4"));
   write_overlay_picture(overlay.path, 2 * overlay.frames / 3, in(folder, "overlay.png"));
 
   out << in(folder, "tracks.csv") << ": " << fitting::summary(result.report) << '\n';
+  if (returned) out << fitting::summary(*returned) << '\n';
   if (error) print_error(*error, out);
   return ExitCode::ok;
 }

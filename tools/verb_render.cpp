@@ -60,6 +60,7 @@ class Render : public Verb {
     const std::string folder = context.output_folder();
     const auto in_folder = [&folder](const char* name) { return (fs::path(folder) / name).string(); };
 
+    require_encoder(c, fit, folder);
     TwinRun twin = motion(context, truth, stride, in_folder("truth_motion.bin"));
     if (context.progress.interrupted()) return ExitCode::interrupted;
     // From here on what the folder holds of an earlier truth is wrong. Footage and camera of before stay
@@ -80,6 +81,16 @@ class Render : public Verb {
   }
 
  private:
+  /// What cannot be encoded is refused before the truth is simulated, which may take hours.
+  static void require_encoder(const fitting::Case& c, const Scene& fit, const std::string& folder) {
+    int width = c.render.width, height = c.render.height;
+    if (!c.camera.empty()) {
+      const fitting::Camera camera = fitting::read_camera(c.camera);
+      width = camera.width, height = camera.height;
+    }
+    const FootageWriter opened(footage_in(c, folder), c.render.codec, fit.time.frame_rate, width, height);
+  }
+
   TwinRun motion(VerbContext& context, const SceneModel& truth, int stride, const std::string& path) const {
     if (keep_motion_ && fs::exists(path)) {
       TwinRun kept;

@@ -1,6 +1,7 @@
 // rhytid track: footage to tracks of skin points, with their uncertainty.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <sstream>
 
 #include "fitting/case.h"
@@ -34,17 +35,29 @@ class TrackVerb : public Verb {
         ->expected(4)
         ->delimiter(',')
         ->option_text("X,Y,W,H");
-    app.add_option("--max-tracks", max_tracks_, "at most this many tracks")
+    app.add_option("--max-tracks", max_tracks_, "at most this many points, the best corners first (300)")
         ->option_text("N")
         ->check(CLI::Range(1, 100000));
+    app.add_option("--min-distance", min_distance_, "between points in the first frame, px (8)")
+        ->option_text("PX")
+        ->check(CLI::Range(1.0, 1000.0));
+    app.add_option(
+           "--window", window_,
+           "side of the window about a point, px, odd (21); a small one resolves finer motion, a large "
+           "one is surer where texture is weak")
+        ->option_text("PX")
+        ->check(CLI::Validator(odd_window, ""));
     app.add_option("--frames", frames_, "only the first N frames")
         ->option_text("N")
         ->check(CLI::Range(1, 1000000));
     app.add_option("--model", model_,
-                   "how the picture around a point may deform: affine (default), or translation for poor "
-                   "footage, as of faces")
+                   "how the picture around a point may deform: affine (default), or translation, which has "
+                   "less freedom and fits skin that only shifts")
         ->option_text("MODEL")
         ->check(CLI::IsMember({"affine", "translation"}));
+    app.add_flag("--there-and-back", there_and_back_,
+                 "also follow the points back from the last frame to the first and say how far from their "
+                 "start they end: drift, in px; takes as long again");
   }
 
   ExitCode run(VerbContext& context) override {
@@ -58,24 +71,35 @@ class TrackVerb : public Verb {
     const std::string folder = context.output_folder();
     TrackJob job;
     if (context.options.file.empty()) {
-      job.footage.path = video_;
-      job.options.seeds.max_tracks = 300;
+      job = track_job(video_, asked({}));
     } else {
       const fitting::Case c = fitting::load_case(context.options.file, context.options.settings);
-      job = track_job(c, folder, video_, context.progress);
+      job = track_job(c, folder, video_, context.progress, asked(c.track));
     }
-    if (roi_.size() == 4)
-      job.options.seeds.region = cv::Rect(static_cast<int>(roi_[0]), static_cast<int>(roi_[1]),
-                                          static_cast<int>(roi_[2]), static_cast<int>(roi_[3]));
-    if (!model_.empty())
-      job.options.model =
-          model_ == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
-    if (max_tracks_ > 0) job.options.seeds.max_tracks = max_tracks_;
+    job.there_and_back = there_and_back_;
     if (frames_ > 0) job.footage.last = frames_ - 1;
     return track_footage(job, folder, context.options.threads, context.progress, context.out);
   }
 
  private:
+  static std::string odd_window(const std::string& text) {
+    int value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool is_number = error == std::errc() && end == text.data() + text.size();
+    if (is_number && value >= 7 && value <= 201 && value % 2 == 1) return {};
+    return "got " + text + ", expected an odd number of px from 7 to 201";
+  }
+
+  /// `track` with what the options say in its place.
+  fitting::TrackCase asked(fitting::TrackCase track) const {
+    if (roi_.size() == 4) track.roi = {roi_[0], roi_[1], roi_[2], roi_[3]};
+    if (!model_.empty()) track.model = model_;
+    if (max_tracks_ > 0) track.max_tracks = max_tracks_;
+    if (min_distance_ > 0) track.min_distance = min_distance_;
+    if (window_ > 0) track.window = window_;
+    return track;
+  }
+
   std::string roi_text() const {
     std::ostringstream text;
     for (const double value : roi_) text << (text.tellp() > 0 ? "," : "") << value;
@@ -84,7 +108,9 @@ class TrackVerb : public Verb {
 
   std::string video_, model_;
   std::vector<double> roi_;
-  int max_tracks_ = 0, frames_ = 0;
+  int max_tracks_ = 0, frames_ = 0, window_ = 0;
+  double min_distance_ = 0;
+  bool there_and_back_ = false;
 };
 
 }  // namespace

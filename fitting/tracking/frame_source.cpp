@@ -123,6 +123,9 @@ struct FrameSource::Reader {
   double rate = 1;
   cv::Size size;
   double quantum = 1;
+  // Backwards: frames that wait to be delivered, the next one last, and how many come before them.
+  std::vector<Frame> block;
+  int before_block = 0;
 
   cv::Mat load(int index) const {
     const cv::Mat image = cv::imread(images[index], cv::IMREAD_UNCHANGED);
@@ -181,6 +184,14 @@ FrameSource::FrameSource(FrameSourceOptions options)
   if (r.total > 0 && o.first >= r.total)
     throw InputError(r.origin + ": first", std::to_string(o.first),
                      "less than the " + std::to_string(r.total) + " frames there are");
+  if (o.backwards) {
+    if (o.last < 0 && r.total == 0)
+      throw InputError(o.path, "a video that does not say how long it is",
+                       "a last frame, to read backwards from");
+    const int end =
+        r.total > 0 && o.last >= 0 ? std::min(o.last + 1, r.total) : std::max(o.last + 1, r.total);
+    r.before_block = (end - o.first + o.step - 1) / o.step;
+  }
 }
 
 FrameSource::~FrameSource() = default;
@@ -192,6 +203,32 @@ FrameSource::FrameSource(FrameSource&&) noexcept = default;
 FrameSource& FrameSource::operator=(FrameSource&&) noexcept = default;
 
 std::optional<Frame> FrameSource::next() {
+  return options_.backwards ? next_backwards() : next_forwards();
+}
+
+std::optional<Frame> FrameSource::next_backwards() {
+  constexpr double kBlock = 256e6;  // bytes
+  Reader& r = *reader_;
+  const double frame_bytes = 7.0 * r.size.area();  // grey in floating point and colour
+  const int longest = std::max(8, static_cast<int>(kBlock / std::max(1.0, frame_bytes)));
+  // A file that is shorter than it says has nothing in its last blocks.
+  while (r.block.empty()) {
+    if (r.before_block == 0) return std::nullopt;
+    const int count = std::min(r.before_block, longest);
+    r.before_block -= count;
+    FrameSourceOptions part = options_;
+    part.backwards = false;
+    part.first = options_.first + r.before_block * options_.step;
+    part.last = part.first + (count - 1) * options_.step;
+    FrameSource forwards(part);
+    while (std::optional<Frame> frame = forwards.next()) r.block.push_back(std::move(*frame));
+  }
+  Frame frame = std::move(r.block.back());
+  r.block.pop_back();
+  return frame;
+}
+
+std::optional<Frame> FrameSource::next_forwards() {
   Reader& r = *reader_;
   // Seeking by index is inexact in many containers, so skipped frames are decoded and dropped.
   const auto wanted = [&](int index) {

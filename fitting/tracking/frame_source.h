@@ -28,9 +28,12 @@ struct FrameSourceOptions {
   int first = 0;                 ///< first frame delivered
   int last = -1;                 ///< last frame delivered, −1 = to the end
   int step = 1;                  ///< deliver every step-th frame from `first`
+  /// The same frames, the last one first. A video does not seek exactly: it is decoded in blocks that fit
+  /// into 256 MB, each from the beginning of the file. Its length must be known.
+  bool backwards = false;
 };
 
-/// Reads frames in order. Memory: one frame at a time.
+/// Reads frames in order. Memory: one frame at a time (or a block, backwards).
 class FrameSource {
  public:
   /// Throws InputError naming the path when nothing can be read or an option is out of range.
@@ -39,7 +42,8 @@ class FrameSource {
   FrameSource(FrameSource&&) noexcept;
   FrameSource& operator=(FrameSource&&) noexcept;
 
-  /// The next frame, or nothing at the end. Throws InputError when a still is unreadable or changes size.
+  /// The next frame, or nothing at the end (backwards: at the beginning). Throws InputError when a still is
+  /// unreadable or changes size.
   std::optional<Frame> next();
 
   /// How many frames were asked for: by `last`, else by the length of the sequence or what the container
@@ -56,6 +60,8 @@ class FrameSource {
 
  private:
   struct Reader;
+  std::optional<Frame> next_forwards();
+  std::optional<Frame> next_backwards();
   FrameSourceOptions options_;
   std::unique_ptr<Reader> reader_;
 };

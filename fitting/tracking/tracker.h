@@ -25,7 +25,7 @@ struct FrameCounts {
   int redetected = 0;
   double residual_grey =
       0;  ///< median residual of the accepted windows: noise of both smoothed images together, grey
-  double forward_backward_px = 0;  ///< median over accepted tracks
+  double forward_backward_px = 0;  ///< median over accepted tracks, as in TrackerReport
 };
 
 /// Why a measurement was refused.
@@ -100,7 +100,9 @@ struct TrackerReport {
   int unbroken = 0;  ///< ok in every frame
   int template_updates = 0;
   int redetected = 0;
-  double forward_backward_median_px = 0;  ///< over all accepted measurements
+  /// Flow from one frame to the next and back: distance from where it began, over all accepted measurements.
+  /// It judges the prediction in single frames and knows no drift (there_and_back.h does).
+  double forward_backward_median_px = 0;
   double forward_backward_95_px = 0;
   double noise_grey = 0;       ///< per smoothed image: median residual / √2
   double sigma_median_px = 0;  ///< of displacements since the first frame: median of sqrt(trace/2)

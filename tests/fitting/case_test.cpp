@@ -87,6 +87,7 @@ TEST_F(CaseTest, DefaultsAreThoseOfTheStructs) {
   EXPECT_EQ(c.render.width, RenderCase().width);
   EXPECT_EQ(c.render.noise, RenderCase().noise);
   EXPECT_EQ(c.track.max_tracks, TrackCase().max_tracks);
+  EXPECT_EQ(c.track.window, TrackCase().window);
   EXPECT_FALSE(c.track.roi);
   EXPECT_EQ(c.fit.max_evaluations, FitCase().max_evaluations);
   EXPECT_EQ(c.fit.min_sigma, FitCase().min_sigma);
@@ -129,6 +130,8 @@ TEST_F(CaseTest, WrongCasesAreRefusedWithPlaceAndRemedy) {
   EXPECT_THAT(error_of(R"({})"), AllOf(HasSubstr("/scene"), HasSubstr("required")));
   EXPECT_THAT(error_of(R"({"scene": "absent.json"})"), HasSubstr("absent.json"));
   EXPECT_THAT(error_of(R"({"scene": "scene.json", "track": {"roi": [1, 2, 3]}})"), HasSubstr("/track/roi"));
+  EXPECT_THAT(error_of(R"({"scene": "scene.json", "track": {"window": 20}})"),
+              AllOf(HasSubstr("case.json:1: /track/window: got 20"), HasSubstr("odd")));
   const auto parameter = [this](const std::string& text) {
     return error_of("{\"scene\": \"scene.json\", \"fit\": {\"parameters\": [" + text + "]}}");
   };

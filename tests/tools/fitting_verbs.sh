@@ -92,6 +92,8 @@ done
 expect 2 1 'got a value of the scene, .*: --set "/settings/1=/skin/order=3"$' fit case.json -o a --set /skin/order=3
 
 expect 2 1 '^rhytid: error: --max-tracks' track case.json -o a --max-tracks=-7
+expect 2 1 '^rhytid: error: --min-distance' track case.json -o a --min-distance 0.5
+expect 2 1 '^rhytid: error: --window: got 20, expected an odd number of px from 7 to 201' track case.json -o a --window 20
 expect 2 1 '^rhytid: error: --roi: got 0,0,0,0, expected' track case.json -o a --roi 0,0,0,0
 expect 2 1 '^rhytid: error: --roi: got 0,0,1e\+12,1e\+12, expected .* from 0 to 100000' track case.json -o a --roi 0,0,1e12,1e12
 expect 2 1 '^rhytid: error: --model' track case.json -o a --model rigid
@@ -108,6 +110,29 @@ written a tracks.csv overlay.png track.json fit.json residuals.csv fitted_scene.
 grep -q '</html>' a/report.html || fail "report.html is not whole"
 chi=$(python3 -c 'import json; print(json.load(open("a/fit.json"))["reduced_chi_square"])')
 echo "reduced chi-square $chi"
+
+# The other optimiser ends where the first does.
+mkdir n && cp a/{footage.avi,camera.yaml,truth.json,tracks.csv} n
+expect 0 0 '^Status: converged after [0-9]+ forward runs' fit case.json -o n --optimiser nlopt
+python3 - <<'PYTHON' || fail "nlopt and ceres differ"
+import json
+ceres, nlopt = (json.load(open(folder + "/fit.json")) for folder in "an")
+assert ceres["optimiser"].startswith("ceres") and nlopt["optimiser"].startswith("nlopt"), nlopt["optimiser"]
+assert abs(nlopt["final_cost"] / ceres["final_cost"] - 1) < 1e-6, (nlopt["final_cost"], ceres["final_cost"])
+values = [fit["parameters"][0]["value"] for fit in (ceres, nlopt)]
+print("ceres, nlopt:", values, ceres["forward_runs"], nlopt["forward_runs"], "runs")
+assert abs(values[1] / values[0] - 1) < 1e-3, values
+PYTHON
+
+# Without H.264: said before anything is simulated, and the overlay takes Motion JPEG.
+export OPENCV_VIDEOIO_PRIORITY_FFMPEG=0
+expect 2 1 '^rhytid: error: j/footage.mp4: got no working encoder for h264, expected .*, or /render/codec mjpg$' \
+  render case.json -o j --set /render/codec=h264
+[ ! -e j ] || fail "a refused render left $(ls j)"
+mkdir j && cp a/{footage.avi,camera.yaml} j
+expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o j
+unset OPENCV_VIDEOIO_PRIORITY_FFMPEG
+written j overlay.avi overlay.png
 
 # Tracks are those of the footage and of what the case asks, or made again; never so over what was asked by hand.
 mkdir c && cp a/{camera.yaml,tracks.csv,track.json} c && cp a/footage.avi A.avi

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <sstream>
@@ -104,6 +105,65 @@ TEST_F(TwinFootage, VideoOpensWithTheFitsFrames) {
   EXPECT_EQ(modulus, 0.08);
 }
 
+/// All frames of a video, BGR.
+std::vector<cv::Mat> frames_of(const std::string& path) {
+  std::vector<cv::Mat> frames;
+  cv::VideoCapture video(path);
+  for (cv::Mat frame; video.read(frame);) frames.push_back(frame.clone());
+  return frames;
+}
+
+double mean_difference(const cv::Mat& a, const cv::Mat& b) {
+  cv::Mat difference;
+  cv::absdiff(a, b, difference);
+  const cv::Scalar mean = cv::mean(difference);
+  return (mean[0] + mean[1] + mean[2]) / 3;
+}
+
+bool has_h264_encoder(const std::string& scratch) {
+  cv::VideoWriter writer;
+  return writer.open(scratch, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'), 20, {160, 120});
+}
+
+TEST_F(TwinFootage, H264HoldsTheSameFrames) {
+  const std::vector<std::string> arguments = {"render",     path("case.json"), "-o",
+                                              path("h264"), "--set",           "/render/codec=h264"};
+  const Outcome film = run(arguments);
+  if (!has_h264_encoder(path("probe.mp4"))) {
+    EXPECT_EQ(film.code, 2);
+    EXPECT_THAT(film.err, HasSubstr("footage.mp4: got no working encoder for h264, expected"));
+    EXPECT_FALSE(fs::exists(path("h264/truth_motion.bin"))) << "refused before the simulation, not after it";
+    GTEST_SKIP() << "no H.264 encoder: its absence was tested";
+  }
+  ASSERT_EQ(film.code, 0) << film.err;
+  EXPECT_THAT(film.out, HasSubstr("footage.mp4: 5 frames at 20 Hz, 160 x 120 px"));
+  cv::VideoCapture video(path("h264/footage.mp4"));
+  ASSERT_TRUE(video.isOpened());
+  EXPECT_NEAR(video.get(cv::CAP_PROP_FPS), 20, 1e-3);
+  const std::vector<cv::Mat> frames = frames_of(path("h264/footage.mp4")),
+                             jpegs = frames_of(path("out/footage.avi"));
+  ASSERT_EQ(frames.size(), 5u);
+  ASSERT_EQ(jpegs.size(), 5u);
+  // Each is its own frame and no neighbour: from frame 2 on the motion shows above the coding.
+  double worst = 0, closest_other = 255;
+  for (std::size_t f = 0; f < 5; ++f) {
+    ASSERT_EQ(frames[f].size(), cv::Size(160, 120));
+    for (std::size_t g = 0; g < 5; ++g) {
+      const double difference = mean_difference(frames[f], jpegs[g]);
+      if (f == g) worst = std::max(worst, difference);
+      if (f != g && std::max(f, g) > 2) closest_other = std::min(closest_other, difference);
+    }
+  }
+  for (const int f : {0, 2, 4}) {  // before any codec
+    const cv::Mat exact = cv::imread(path("h264/frame_000") + std::to_string(f) + ".png");
+    worst = std::max(worst, mean_difference(frames[static_cast<std::size_t>(f)], exact));
+  }
+  std::printf("H.264: frames differ by %.2f grey levels at most, from others by %.2f\n", worst,
+              closest_other);
+  EXPECT_LT(worst, 5);
+  EXPECT_GT(closest_other, 1.1 * worst);
+}
+
 TEST_F(TwinFootage, MotionIsThatOfTheTruthsRun) {
   const SceneModel truth(load_scene(path("scene.json"), {"/skin/layers/skin/youngs_modulus=80 kPa"}));
   const Trajectory run = simulate(truth.model(), truth.native(), truth.run_options());
@@ -170,6 +230,42 @@ TEST_F(TwinFootage, TrackerFindsTheTruth) {
   EXPECT_TRUE(fs::exists(path("out/overlay.png")));
 }
 
+TEST_F(TwinFootage, OverlayVideoShowsTheTracksOverTheFootage) {
+  ASSERT_EQ(run({"track", path("case.json"), "-o", path("out"), "--threads", "2"}).code, 0);
+  const bool is_h264 = has_h264_encoder(path("probe.mp4"));
+  EXPECT_EQ(fs::exists(path("out/overlay.mp4")), is_h264);
+  EXPECT_EQ(fs::exists(path("out/overlay.avi")), !is_h264);
+  const std::vector<cv::Mat> overlay = frames_of(path(is_h264 ? "out/overlay.mp4" : "out/overlay.avi")),
+                             footage = frames_of(path("out/footage.avi"));
+  ASSERT_EQ(overlay.size(), 5u);
+  const fitting::TrackSet tracks = fitting::read_tracks(path("out/tracks.csv"));
+  for (int f = 0; f < 5; ++f) {
+    const cv::Mat& drawn = overlay[static_cast<std::size_t>(f)];
+    const cv::Mat& plain = footage[static_cast<std::size_t>(f)];
+    ASSERT_EQ(drawn.size(), plain.size());
+    // Where there are dots the picture has changed, elsewhere it has not.
+    cv::Mat difference, near = cv::Mat::zeros(plain.size(), CV_8U);
+    cv::absdiff(drawn, plain, difference);
+    int dots = 0;
+    for (const fitting::Track& t : tracks.tracks)
+      for (const fitting::Observation& o : t.observations) {
+        if (o.frame > f || (o.frame < f && o.status != fitting::TrackStatus::ok)) continue;
+        const Vec2 at = o.status == fitting::TrackStatus::ok ? o.pixel : t.at(f - 1)->pixel;
+        dots += o.frame == f && o.status == fitting::TrackStatus::ok;
+        cv::circle(near, {static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))}, 5,
+                   255, cv::FILLED);
+      }
+    ASSERT_GT(dots, 10);
+    cv::rectangle(near, {0, 0, 160, 24}, 255, cv::FILLED);  // the caption
+    const auto mean = [](const cv::Scalar& s) { return (s[0] + s[1] + s[2]) / 3; };
+    cv::Mat away;
+    cv::bitwise_not(near, away);
+    cv::rectangle(near, {0, 0, 160, 24}, 0, cv::FILLED);
+    EXPECT_GT(mean(cv::mean(difference, near)), 3 * mean(cv::mean(difference, away))) << "frame " << f;
+    EXPECT_LT(mean(cv::mean(difference, away)), 6) << "frame " << f;
+  }
+}
+
 TEST_F(TwinFootage, VideoWithoutACase) {
   const Outcome tracked = run({"track", "--video", path("out/footage.avi"), "--roi", "30,20,100,60",
                                "--max-tracks", "20", "--frames", "3", "-o", path("direct")});
@@ -183,6 +279,52 @@ TEST_F(TwinFootage, VideoWithoutACase) {
     EXPECT_LT(track.observations[0].pixel.y(), 80);
   }
   EXPECT_EQ(run({"track", "-o", path("direct")}).code, 2);
+}
+
+/// What a case says of tracking can be said without one, to the same bits.
+TEST_F(TwinFootage, OptionsOfVideoAreThoseOfACase) {
+  const Outcome by_case =
+      run({"track", path("case.json"), "--video", path("out/footage.avi"), "-o", path("by_case"), "--set",
+           "/track/mask_finger=false", "--set",
+           R"(/track={"max_tracks": 30, "min_distance": 5, "window": 15, "model": "translation",
+               "roi": [30, 20, 100, 60], "mask_finger": false})"});
+  ASSERT_EQ(by_case.code, 0) << by_case.err;
+  const std::vector<std::string> options = {
+      "--roi", "30,20,100,60", "--max-tracks", "30",      "--min-distance",
+      "5",     "--window",     "15",           "--model", "translation"};
+  std::vector<std::string> arguments = {"track", "--video", path("out/footage.avi"), "-o",
+                                        path("by_options")};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  const Outcome by_options = run(arguments);
+  ASSERT_EQ(by_options.code, 0) << by_options.err;
+  EXPECT_EQ(read_file(path("by_options/tracks.csv")), read_file(path("by_case/tracks.csv")));
+  // Each of them has a say.
+  for (std::size_t k = 0; k < options.size(); k += 2) {
+    std::vector<std::string> fewer = {"track", "--video", path("out/footage.avi"), "-o", path("fewer")};
+    for (std::size_t i = 0; i < options.size(); ++i)
+      if (i != k && i != k + 1) fewer.push_back(options[i]);
+    ASSERT_EQ(run(fewer).code, 0);
+    EXPECT_NE(read_file(path("fewer/tracks.csv")), read_file(path("by_options/tracks.csv"))) << options[k];
+  }
+}
+
+TEST_F(TwinFootage, ThereAndBackIsPrintedAndRecorded) {
+  const std::vector<std::string> arguments = {"track",      "--video", path("out/footage.avi"), "-o",
+                                              path("back"), "--roi",   "30,20,100,60"};
+  const Outcome once = run(arguments);
+  ASSERT_EQ(once.code, 0) << once.err;
+  EXPECT_THAT(once.out, HasSubstr("flow there and back per frame: median"));
+  EXPECT_FALSE(nlohmann::json::parse(read_file(path("back/track.json"))).contains("there_and_back_px"));
+  std::vector<std::string> twice = arguments;
+  twice.push_back("--there-and-back");
+  const Outcome back = run(twice);
+  ASSERT_EQ(back.code, 0) << back.err;
+  EXPECT_THAT(back.out, HasSubstr("there and back over the whole clip: median"));
+  const auto record = nlohmann::json::parse(read_file(path("back/track.json")));
+  EXPECT_EQ(record["there_and_back_px"]["sent"], record["tracks"]["kept"]);
+  EXPECT_GT(record["there_and_back_px"]["returned"].get<int>(), 10);
+  EXPECT_LT(record["there_and_back_px"]["median"].get<double>(), 0.2);
+  EXPECT_GT(record["there_and_back_px"]["median"].get<double>(), 1e-4);
 }
 
 TEST_F(TwinFootage, SameBitsForAnyNumberOfThreads) {

@@ -17,7 +17,10 @@ FootageWriter::FootageWriter(std::string path, const std::string& codec, double 
       is_jpeg ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G') : cv::VideoWriter::fourcc('a', 'v', 'c', '1');
   const int back_end = is_jpeg ? cv::CAP_OPENCV_MJPEG : cv::CAP_FFMPEG;
   if (!writer_.open(file_.path(), back_end, code, frames_per_second, {width, height}) || !writer_.isOpened())
-    throw InputError(path_, "no working encoder for " + codec, "a writable folder and OpenCV with FFmpeg");
+    throw InputError(
+        path_, "no working encoder for " + codec,
+        is_jpeg ? "a writable folder"
+                : "a writable folder and OpenCV with FFmpeg and an H.264 encoder, or /render/codec mjpg");
   if (is_jpeg) writer_.set(cv::VIDEOWRITER_PROP_QUALITY, 98);
 }
 

@@ -4,7 +4,8 @@ namespace rhytid::tools {
 
 using nlohmann::json;
 
-json track_record(const fitting::TrackerReport& report, const std::optional<TrackingError>& against_truth) {
+json track_record(const fitting::TrackerReport& report, const std::optional<fitting::ThereAndBack>& returned,
+                  const std::optional<TrackingError>& against_truth) {
   json refusals = json::object();
   for (int i = 1; i < fitting::kNumRefusals; ++i) {
     const int count = report.refusals[static_cast<size_t>(i)];
@@ -36,6 +37,11 @@ json track_record(const fitting::TrackerReport& report, const std::optional<Trac
       {"sigma_median_px", report.sigma_median_px},
       {"refusals", refusals},
       {"frames", frames}};
+  if (returned)
+    record["there_and_back_px"] = {{"median", returned->median_px},
+                                   {"p90", returned->p90_px},
+                                   {"sent", returned->sent},
+                                   {"returned", returned->returned}};
   if (against_truth) {
     const TrackingError& e = *against_truth;
     record["error_against_truth"] = {{"tracks", e.tracks},
