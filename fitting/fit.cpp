@@ -60,8 +60,8 @@ NoiseCheck check_noise(FitProblem& problem, const FitEvaluation& at, const Vecto
   return check;
 }
 
-/// Residuals and Jacobian by track, rows numbered by frame and axis; shifts count as frame 0 and, from a renewal on,
-/// as frames behind the last.
+/// Residuals and Jacobian by track, rows numbered by frame and axis; shifts count as frame 0 and, from a
+/// renewal on, as frames behind the last.
 std::vector<WhitenedTrack> whitened_tracks(const FitProblem& problem, const FitProblem::Linearised& at) {
   std::vector<WhitenedTrack> tracks;
   Eigen::Index row = 0;

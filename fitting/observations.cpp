@@ -192,8 +192,8 @@ TrackSet read_tracks(const std::string& path) {
     for (const auto& [index, entry] : frames) {
       const auto& [o, number] = entry;
       if (o.renewed && !is_begun)
-        throw InputError(path + ":" + std::to_string(number), "status 'renewed' in a track's first observation",
-                         "an ok one before it");
+        throw InputError(path + ":" + std::to_string(number),
+                         "status 'renewed' in a track's first observation", "an ok one before it");
       is_begun = is_begun || o.status == TrackStatus::ok;
       track.observations.push_back(o);
     }

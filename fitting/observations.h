@@ -2,10 +2,10 @@
 //
 // File: one row per track, frame and camera; header exactly
 //   frame,time_s,track_id,camera,x_px,y_px,sxx_px2,sxy_px2,syy_px2,corr,status
-// status ok or renewed: all numbers present and finite, covariance positive definite, −1 <= corr <= 1; renewed
-// is ok in all else, and the first of those that are measured against a new template (below).
-// any other status: the six number columns x_px ... corr are empty, because nothing was measured.
-// Numbers are written so that reading gives back the same bits.
+// status ok or renewed: all numbers present and finite, covariance positive definite, −1 <= corr <= 1;
+// renewed is ok in all else, and the first of those that are measured against a new template (below). any
+// other status: the six number columns x_px ... corr are empty, because nothing was measured. Numbers are
+// written so that reading gives back the same bits.
 //
 // What the covariances contain. The first ok observation of a track says which material point it is, and its
 // error o is shared by all later ones; e_f is what observation f errs by itself:
@@ -16,8 +16,8 @@
 // others. The tracker puts the noise of the template into the first observation, since it is common to all
 // frames.
 //
-// A renewed template is cut where the last ok observation before it was, so that the error of that one, g, stays in
-// all that follow: from there on pixel_f has o' ~ N(0, covariance of g) besides, once per renewal.
+// A renewed template is cut where the last ok observation before it was, so that the error of that one, g,
+// stays in all that follow: from there on pixel_f has o' ~ N(0, covariance of g) besides, once per renewal.
 // Tests: tests/fitting/observations_test.cpp
 #pragma once
 

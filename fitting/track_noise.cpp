@@ -54,7 +54,8 @@ TrackNoise::TrackNoise(const Track& track, const std::vector<const Observation*>
     }
     last = &o;
   }
-  require(next == used.end() && last != nullptr, "TrackNoise: observations used are not later ones of the track");
+  require(next == used.end() && last != nullptr,
+          "TrackNoise: observations used are not later ones of the track");
   // Those behind the last one used shift nothing that is seen.
   std::erase_if(renewals, [&](const Renewal& r) { return r.from == static_cast<int>(later.size()); });
   build(later, renewals);
@@ -65,7 +66,8 @@ void TrackNoise::build(const std::vector<Eigen::Matrix2d>& later, const std::vec
   for (const Eigen::Matrix2d& c : later) roots_.push_back(inverse_root(c));
   shift_of_.assign(later.size(), 0);
   for (const Renewal& r : renewals) {
-    require(r.from >= 0 && r.from < static_cast<int>(later.size()), "TrackNoise: a renewal outside the frames");
+    require(r.from >= 0 && r.from < static_cast<int>(later.size()),
+            "TrackNoise: a renewal outside the frames");
     shift_covariances_.push_back(r.covariance);
     for (std::size_t f = r.from; f < later.size(); ++f) ++shift_of_[f];
   }
@@ -129,7 +131,8 @@ MatrixXd TrackNoise::without(const MatrixXd& basis, MatrixXd columns) {
 }
 
 MatrixXd TrackNoise::whitened_jacobian(const VectorXd& r, const Evaluation& at, const MatrixXd& dr) const {
-  MatrixXd out = MatrixXd::Zero(num_rows(), dr.cols()), by_shift = MatrixXd::Zero(num_rows(), 2 * num_shifts());
+  MatrixXd out = MatrixXd::Zero(num_rows(), dr.cols()),
+           by_shift = MatrixXd::Zero(num_rows(), 2 * num_shifts());
   // ∂o = (Σ_f h_f + C_0^{−1})^{−1} Σ_f h_f ∂r_f with h_f the second derivative of ½ρ by r_f.
   MatrixXd curvature = shift_root_.transpose() * shift_root_;
   MatrixXd shift_rhs = MatrixXd::Zero(2 * num_shifts(), dr.cols());
@@ -155,7 +158,8 @@ MatrixXd TrackNoise::whitened_jacobian(const VectorXd& r, const Evaluation& at, 
 }
 
 MatrixXd TrackNoise::weighted_jacobian(const Evaluation& at, const MatrixXd& dr) const {
-  MatrixXd out = MatrixXd::Zero(num_rows(), dr.cols()), by_shift = MatrixXd::Zero(num_rows(), 2 * num_shifts());
+  MatrixXd out = MatrixXd::Zero(num_rows(), dr.cols()),
+           by_shift = MatrixXd::Zero(num_rows(), 2 * num_shifts());
   for (std::size_t f = 0; f < roots_.size(); ++f) {
     const Eigen::Matrix2d block = std::sqrt(at.weights[f]) * roots_[f];
     out.middleRows<2>(2 * f) = block * dr.middleRows(2 * f, 2);

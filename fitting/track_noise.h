@@ -9,8 +9,8 @@
 // discounted without leaking into the others through the common shift.
 //
 // Where the tracker renewed its template, frames from there on share a further shift. With s_0 = o and
-// s_k = s_{k−1} + o_k the whole shift after the k-th renewal, o above is that of the frame's template and the last
-// term becomes ½ s_0ᵀ C_0^{−1} s_0 + ½ Σ_k (s_k − s_{k−1})ᵀ R_k^{−1} (s_k − s_{k−1}).
+// s_k = s_{k−1} + o_k the whole shift after the k-th renewal, o above is that of the frame's template and the
+// last term becomes ½ s_0ᵀ C_0^{−1} s_0 + ½ Σ_k (s_k − s_{k−1})ᵀ R_k^{−1} (s_k − s_{k−1}).
 //
 // Source   marginalisation by variable projection (Golub and Pereyra 1973).   Units px.
 // Tests    tests/fitting/track_noise_test.cpp
@@ -34,8 +34,8 @@ class TrackNoise {
   /// positive definite. `huber` is k in standard deviations, 0 = plain least squares. `renewals` by frame.
   TrackNoise(const Eigen::Matrix2d& first, const std::vector<Eigen::Matrix2d>& later, double huber,
              const std::vector<Renewal>& renewals = {});
-  /// Of the observations `used` of a track, ok and after its first ok one, in order; the deviations of the first
-  /// and of each are raised to at least `floor` px. Renewals count from the first on, used or not.
+  /// Of the observations `used` of a track, ok and after its first ok one, in order; the deviations of the
+  /// first and of each are raised to at least `floor` px. Renewals count from the first on, used or not.
   TrackNoise(const Track& track, const std::vector<const Observation*>& used, double floor, double huber);
 
   int num_observations() const { return static_cast<int>(roots_.size()); }

@@ -167,8 +167,8 @@ void accept(const Measurement& m, const ResidualCorrelation& correlation, const 
   if (f->baseline == 0) f->baseline = std::max(f->residual, view.least_residual);
   f->warp = m.alignment.warp;
   // Half of the residual's noise is the template's, which all frames share, half the frame's own. The
-  // position of a renewed template is as uncertain as the frame it was cut from; the readers of the track know
-  // (observations.h).
+  // position of a renewed template is as uncertain as the frame it was cut from; the readers of the track
+  // know (observations.h).
   const Eigen::Matrix2d both =
       correlation.covariance(m.alignment, std::max(f->residual, view.least_residual));
   if (!f->common) f->common = 0.5 * both;

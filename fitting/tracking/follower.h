@@ -20,8 +20,8 @@ struct Follower {
   PatchWarp warp;
   /// Covariance of what all frames err alike: the noise of the first template as its alignments felt it, px².
   std::optional<Eigen::Matrix2d> common;
-  std::optional<Alignment> with_itself;                 ///< of the first template, until `common` is known
-  bool renewed = false;  ///< the template is newer than the last recorded observation
+  std::optional<Alignment> with_itself;  ///< of the first template, until `common` is known
+  bool renewed = false;                  ///< the template is newer than the last recorded observation
   Eigen::Matrix2d template_gradient =
       Eigen::Matrix2d::Identity();                       ///< deformation from first frame to template
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< own, in the last ok frame, px²

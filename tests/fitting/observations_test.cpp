@@ -109,7 +109,7 @@ TEST_F(TracksFile, NamesLineColumnAndExpectation) {
   EXPECT_THAT(refusal("0,0,0,c,1,2,1,1.01,1,1,ok\n"), HasSubstr("sxy_px2 '1.01'"));
   EXPECT_THAT(refusal("0,0,0,c,1,2,1,0,1,1.5,ok\n"), HasSubstr("corr '1.5'"));
   EXPECT_THAT(refusal("0,0,0,c,1,2,1,0,1,1,fine\n"),
-              HasSubstr("status 'fine', expected ok, occluded, lost or outside"));
+              HasSubstr("status 'fine', expected ok, renewed, occluded, lost or outside"));
   EXPECT_THAT(refusal("0,0,0,c,1,,,,,,lost\n"), HasSubstr("an empty field"));
   EXPECT_THAT(refusal("0,0,0,c,1,2,1,0,1,ok\n"), HasSubstr("10 fields, expected 11 fields"));
   EXPECT_THAT(refusal("0,0,0,c,1,2,1,0,1,1,ok\n0,0,0,c,1,2,1,0,1,1,ok\n"), HasSubstr("already on line 2"));

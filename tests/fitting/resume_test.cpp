@@ -224,7 +224,8 @@ TEST_F(Resume, PointWithoutDerivativeIsARefusedStep) {
               testing::AllOf(HasSubstr("failed"), HasSubstr("the Hessian does not factor")));
 }
 
-// The start is known from a log and every other run fails: steps shrink until the optimisers call it convergence.
+// The start is known from a log and every other run fails: steps shrink until the optimisers call it
+// convergence.
 TEST_F(Resume, NoConvergenceWhereNoStepCanBeRun) {
   const FitIdentity identity = {{"test", "of steps"}};
   const std::string folder = (folder_ / "start").string();
