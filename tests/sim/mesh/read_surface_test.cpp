@@ -146,7 +146,9 @@ TEST(ReadGlb, KeepsItsSeamsWhenTold) {
 /// Small files that claim to hold more than they do: refused at once, without room for what they claim.
 TEST(ReadSurface, RefusesSmallFilesThatClaimMuch) {
   std::optional<test::MemoryLimit> limit(std::in_place, std::size_t{256} << 20);
-  EXPECT_THROW((void)std::vector<double>(std::size_t{1} << 26), std::bad_alloc);
+  if (test::MemoryLimit::is_effective) {
+    EXPECT_THROW((void)std::vector<double>(std::size_t{1} << 26), std::bad_alloc);
+  }
   const auto start = std::chrono::steady_clock::now();
   const auto ply = [](const std::string& vertices, const std::string& faces, const std::string& rest) {
     return "ply\nformat ascii 1.0\nelement vertex " + vertices +
