@@ -15,6 +15,7 @@ namespace {
 struct NoisyTrack {
   Eigen::Matrix2d first;
   std::vector<Eigen::Matrix2d> later;
+  std::vector<TrackNoise::Renewal> renewals = {};
   VectorXd r;
   MatrixXd dr;
 };
@@ -43,13 +44,21 @@ MatrixXd joint_covariance(const NoisyTrack& s) {
   for (int a = 0; a < n; ++a)
     for (int b = 0; b < n; ++b)
       sum.block<2, 2>(2 * a, 2 * b) = s.first + (a == b ? s.later[a] : Eigen::Matrix2d::Zero().eval());
+  for (const TrackNoise::Renewal& renewal : s.renewals)
+    for (int a = renewal.from; a < n; ++a)
+      for (int b = renewal.from; b < n; ++b) sum.block<2, 2>(2 * a, 2 * b) += renewal.covariance;
   return sum;
 }
 
-TEST(TrackNoise, PlainCostIsTheJointGaussian) {
-  const NoisyTrack s = make(6);
+class PlainTrackNoise : public testing::TestWithParam<int> {};
+
+// Without renewals and with two of them, the second at once from two templates.
+TEST_P(PlainTrackNoise, CostIsTheJointGaussian) {
+  NoisyTrack s = make(6);
+  if (GetParam() > 0) s.renewals = {{2, s.later[0]}, {5, s.later[1]}, {5, s.later[4]}};
   const MatrixXd precision = joint_covariance(s).inverse();
-  const TrackNoise noise(s.first, s.later, 0);
+  const TrackNoise noise(s.first, s.later, 0, s.renewals);
+  EXPECT_EQ(noise.num_shifts(), 1 + static_cast<int>(s.renewals.size()));
   const auto at = noise.evaluate(s.r);
   EXPECT_NEAR(at.cost, 0.5 * s.r.dot(precision * s.r), 1e-12 * at.cost);
   EXPECT_LT((at.gradient - precision * s.r).norm(), 1e-11 * at.gradient.norm());
@@ -59,17 +68,48 @@ TEST(TrackNoise, PlainCostIsTheJointGaussian) {
             1e-10 * (j.transpose() * at.whitened).norm());
   // Innovations are a whitening of the same Gaussian.
   EXPECT_NEAR(noise.innovations(s.r, at).squaredNorm(), 2 * at.cost, 1e-10 * at.cost);
-  EXPECT_LT((noise.weighted_jacobian(at, s.dr) - j).norm(), 1e-13 * j.norm());
+  EXPECT_LT((noise.weighted_jacobian(at, s.dr) - j).norm(), 1e-12 * j.norm());
+}
+
+INSTANTIATE_TEST_SUITE_P(WithAndWithoutRenewals, PlainTrackNoise, testing::Values(0, 1));
+
+// A track file's renewals become shifts of the frames that are used, whether the frames between are used or
+// not.
+TEST(TrackNoise, ReadsRenewalsFromATrack) {
+  const NoisyTrack s = make(6);
+  Track track;
+  for (int f = 0; f <= 6; ++f)
+    track.observations.push_back(
+        {f, f / 25., TrackStatus::ok, Vec2(f, f), f == 0 ? s.first : s.later[f - 1], 1, f == 3});
+  track.observations.insert(track.observations.begin() + 3, Observation{2, 0.1, TrackStatus::lost});
+  track.observations.erase(track.observations.begin() +
+                           2);  // frame 2 is lost: the template was cut in frame 1
+  std::vector<const Observation*> used;
+  for (const int i : {3, 5, 6}) used.push_back(&track.observations[i]);
+  const TrackNoise noise(track, used, 1e-9, 0);
+  NoisyTrack seen{
+      s.first, {s.later[2], s.later[4], s.later[5]}, {{0, s.later[0]}}, s.r.head(6), s.dr.topRows(6)};
+  ASSERT_EQ(noise.num_shifts(), 2);
+  EXPECT_EQ(noise.shift_of(0), 1);
+  EXPECT_NEAR(noise.evaluate(seen.r).cost, 0.5 * seen.r.dot(joint_covariance(seen).inverse() * seen.r),
+              1e-10);
+  const auto shared = track.shared_covariances();
+  EXPECT_EQ(shared[1], s.first);
+  EXPECT_EQ(shared[6], s.first + s.later[0]);
+  // Behind the last frame used a renewal shifts nothing.
+  track.observations[6].renewed = true;
+  EXPECT_EQ(TrackNoise(track, {&track.observations[3], &track.observations[5]}, 1e-9, 0).num_shifts(), 2);
 }
 
 TEST(TrackNoise, RobustCostHasTheStatedDerivatives) {
   NoisyTrack s = make(6);
   s.r.segment<2>(4) += Vec2(5, -3);  // far outside
   s.r.segment<2>(8) += Vec2(0.5, 0.4);
-  const TrackNoise noise(s.first, s.later, 2.0);
+  s.renewals = {{3, s.later[2]}};
+  const TrackNoise noise(s.first, s.later, 2.0, s.renewals);
   const auto at = noise.evaluate(s.r);
   EXPECT_LT(at.weights[2], 0.2);
-  EXPECT_LT(at.cost, TrackNoise(s.first, s.later, 0).evaluate(s.r).cost);
+  EXPECT_LT(at.cost, TrackNoise(s.first, s.later, 0, s.renewals).evaluate(s.r).cost);
   const MatrixXd j = noise.whitened_jacobian(s.r, at, s.dr);
   const VectorXd by_rows = j.transpose() * at.whitened, by_r = s.dr.transpose() * at.gradient;
   EXPECT_LT((by_rows - by_r).norm(), 1e-9 * by_r.norm());

@@ -64,7 +64,7 @@ Errors errors_of(const TrackSet& set, Truth truth) {
       if (o.status != TrackStatus::ok) continue;
       const Vec2 d = o.pixel - truth(o.frame, t.observations[0].pixel);
       e.rms += d.squaredNorm();
-      e.normalised += d.dot((t.observations[0].covariance + o.covariance).ldlt().solve(d));
+      e.normalised += d.dot((t.shared_covariances()[i] + o.covariance).ldlt().solve(d));
       e.worst = std::max(e.worst, d.norm());
       ++e.count;
     }
@@ -237,6 +237,80 @@ TEST(Tracker, LargeDeformationRenewsTemplates) {
       errors_of(r.tracks, [&](int f, const Vec2& X) { return bulge(0.4 * f / (kFrames - 1), X); });
   EXPECT_LT(e.rms, 0.12);
   EXPECT_LT(e.worst, 0.6);
+}
+
+// A renewed template keeps the error of the place where it was cut: one further shift for all that follows,
+// and no larger errors of the frames themselves. What is stated is an upper bound: the noise of the frame the
+// template is cut from moves its place one way and its alignments the other, and partly cancels.
+TEST(Tracker, RenewedTemplatesShiftWhatFollows) {
+  constexpr int kFrames = 14;
+  const auto stretch = [](int f) {  // until frame 6, then at rest
+    AffineMotion m;
+    m.centre = {kWidth / 2.0, kHeight / 2.0};
+    const double s = std::min(f, 6) / 6.0;
+    m.gradient << 1 + 0.5 * s, 0.1 * s, 0, 1 - 0.2 * s;
+    return m;
+  };
+  TrackerOptions o = small_grid();
+  o.seeds.region = {30, 30, kWidth - 60, kHeight - 60};
+  double squares = 0, jumps = 0, of_frames = 0, stated = 0, own_before = 0, own_after = 0;
+  int numbers = 0, renewed = 0;
+  std::vector<MatrixXd> innovations;
+  std::vector<std::vector<int>> frames;
+  for (const unsigned seed : {40u, 41u}) {
+    const Speckle skin(kWidth, kHeight, seed);
+    FootageFolder folder;
+    for (int f = 0; f < kFrames; ++f) folder.add(picture(skin, stretch(f), 2.0, 1000 * seed + f));
+    FrameSource source = folder.source();
+    for (const Track& t : track(source, o).tracks.tracks) {
+      std::vector<const Observation*> used;
+      std::vector<int> seen;
+      int cut = -1;
+      VectorXd errors(0);
+      for (const Observation& observed : t.observations) {
+        if (observed.frame == 0 || observed.status != TrackStatus::ok) continue;
+        if (observed.renewed) cut = cut < 0 ? static_cast<int>(used.size()) : 0;
+        used.push_back(&observed);
+        seen.push_back(observed.frame);
+        errors.conservativeResize(2 * used.size());
+        errors.tail<2>() = observed.pixel - stretch(observed.frame).forward(t.observations[0].pixel);
+      }
+      if (cut <= 0) continue;  // not renewed, or more than once
+      ++renewed;
+      const TrackNoise model(t, used, 1e-6, 0);
+      ASSERT_EQ(model.num_shifts(), 2);
+      EXPECT_EQ(model.shift_of(cut - 1), 0);
+      EXPECT_EQ(model.shift_of(cut), 1);
+      const auto at = model.evaluate(errors);
+      squares += 2 * at.cost;
+      numbers += static_cast<int>(errors.size());
+      innovations.push_back(model.innovations(errors, at));
+      frames.push_back(seen);
+      // The mean error after the renewal against that before it.
+      const auto n = static_cast<int>(used.size());
+      Vec2 jump = Vec2::Zero();
+      double own[2] = {0, 0};
+      for (int i = 0; i < n; ++i) {
+        const double count = i < cut ? cut : n - cut;
+        jump += (i < cut ? -1 : 1) * errors.segment<2>(2 * i) / count;
+        own[i < cut ? 0 : 1] += used[i]->covariance.trace() / count;
+      }
+      jumps += jump.squaredNorm();
+      of_frames += own[0] / cut + own[1] / (n - cut);
+      stated += used[cut - 1]->covariance.trace();
+      own_before += own[0], own_after += own[1];
+    }
+  }
+  const double chi = squares / numbers, rho = lag_one_autocorrelation(innovations, frames);
+  std::printf("%d renewed: reduced chi-square %.3f, lag-1 %.3f, shift %.2f of the variance stated\n", renewed,
+              chi, rho, (jumps - of_frames) / stated);
+  EXPECT_GT(renewed, 60);
+  EXPECT_GT(chi, 0.75);
+  EXPECT_LT(chi, 1.6);
+  EXPECT_LT(std::fabs(rho), 0.25);
+  EXPECT_LT((jumps - of_frames) / stated, 1);
+  EXPECT_GT((jumps - of_frames) / stated, 0.1);
+  EXPECT_NEAR(own_after / own_before, 1, 0.5);
 }
 
 /// A dark disc with its own texture that sweeps over the skin from the left and leaves on the right.
