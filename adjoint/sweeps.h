@@ -1,16 +1,17 @@
 // Tangent and adjoint sweeps over a converged run. They only combine the blocks that the terms supply.
 //
 //   R_i(u_i; u_{i−1}, s_{i−1}, θ) = 0,   s_i = G(u_i; u_{i−1}, s_{i−1}, θ),   Q = Σ_f q_f(u, s at frame f)
-//   tangent  K_i du_i = −(R_θ dθ + R_{u−} du_{i−1} + R_{s−} ds_{i−1}),  ds_i = G_u du_i + G_{u−} du_{i−1} +
-//   G_{s−} ds_{i−1} + G_θ dθ adjoint  K_i adj = q_u + ū_i + G_uᵀ s̄_i ;  ū_{i−1} = −R_{u−}ᵀ adj + G_{u−}ᵀ s̄_i
-//   ;  s̄_{i−1} = q_s − R_{s−}ᵀ adj + G_{s−}ᵀ s̄_i ;
-//            θ̄ += −R_θᵀ adj + G_θᵀ s̄_i
+//   tangent  K_i du_i = −(R_θ dθ + R_{u−} du_{i−1} + R_{s−} ds_{i−1})
+//            ds_i = G_u du_i + G_{u−} du_{i−1} + G_{s−} ds_{i−1} + G_θ dθ
+//   adjoint  K_i adj = q_u + ū_i + G_uᵀ s̄_i,       θ̄ += −R_θᵀ adj + G_θᵀ s̄_i
+//            ū_{i−1} = −R_{u−}ᵀ adj + G_{u−}ᵀ s̄_i,   s̄_{i−1} = q_s − R_{s−}ᵀ adj + G_{s−}ᵀ s̄_i
 //
 // K is the raw Hessian at the converged state. A run that is incomplete, kept no states, has a step that did
 // not converge, lies outside the domain or whose Hessian does not factor is refused (GradientError): the
 // implicit function theorem does not hold there, a number would be wrong.
 //
-// Source   DESIGN section 4; model-notes "Suggested algebra".    Units  θ in native units (sim/time/model.h).
+// Source   adjoint/README.md, The algebra
+// Units    θ in native units (sim/time/model.h)
 // Tests    tests/adjoint
 #pragma once
 

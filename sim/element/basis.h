@@ -2,7 +2,7 @@
 //
 //   N_(j,k)(u,v,w) = P_j(u,v) T_k(w),   u, v ≥ 0, u + v ≤ 1,   w ∈ [−1, 1]
 //
-// Source   paper.tex, "Displacement Interpolation"; orders p, q = 1..4, equispaced nodes.
+// Source   the publication, "Displacement Interpolation"; orders p, q = 1..4, equispaced nodes.
 #pragma once
 
 #include <array>

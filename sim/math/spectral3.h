@@ -1,10 +1,10 @@
 // Eigenvalues, eigenvectors and divided differences of symmetric 3×3 matrices for a double or a pack of them.
 //
-//   eigen_sym3_packed   cyclic Jacobi without branches; lanes that have converged are rotated by exact
-//   identities log_difference      (ln a − ln b)/(a − b) = 2 atanh(z)/z / (a + b), z = (a − b)/(a + b);
-//   smooth through a = b
+//   eigen_sym3_packed  cyclic Jacobi without branches; lanes that have converged are rotated by exact identities
+//   log_difference     (ln a − ln b)/(a − b) = 2 atanh(z)/z / (a + b), z = (a − b)/(a + b); smooth through a = b
 //
-// Source   DESIGN section 2. Storage of matrices as in sym3.h. Units dimensionless.
+// Shapes   matrices as in sym3.h
+// Units    dimensionless
 // Tests    tests/sim/math/spectral3_test.cpp
 #pragma once
 

@@ -7,8 +7,10 @@
 //   log:  f[a,b] = e^(−m) δ / sinh δ,     power t:  f[a,b] = e^((t−1)m) sinh(tδ) / sinh δ,
 //   m, δ  mean and half difference of ln a and ln b.
 //
-// Source   DESIGN section 2; Daleckii-Krein. Units  dimensionless. Smooth  analytic for I+Y positive
-// definite. Tests    tests/sim/math/sym3_test.cpp
+// Source   Daleckii-Krein
+// Units    dimensionless
+// Smooth   analytic for I + Y positive definite
+// Tests    tests/sim/math/sym3_test.cpp
 #pragma once
 
 #include <cmath>

@@ -21,7 +21,7 @@ constexpr int kMaxLineSearchFailures = 4;  // in a row, each with a more cautiou
 // slowly.
 constexpr int kRawPatience = 5, kPatience = 20;
 constexpr int kMaxNegativeCurvatureExits = 10;
-constexpr double kLbfgsRefreshStep = 1e-6;  // paper.tex, "Non-Linear Solver"
+constexpr double kLbfgsRefreshStep = 1e-6;  // the publication, "Non-Linear Solver"
 constexpr unsigned kNegativeCurvatureSeed = 20240229;
 
 class Minimisation {

@@ -1,7 +1,7 @@
 // The minimisers: Newton with projection on demand (default) and L-BFGS over a frozen factor (the
 // publication's, and ours), with a certificate that the result is a minimum. README.md has the algorithms.
 //
-// Source   paper.tex "Non-Linear Solver" (literal L-BFGS).
+// Source   the publication, "Non-Linear Solver" (literal L-BFGS).
 #pragma once
 
 #include <functional>

@@ -7,9 +7,11 @@
 //
 //   ∂G_s/∂t solves (M + t L) Ġ_s = −L G_s,   ∂w_s/∂t = (Ġ_s − w_s Σ_r Ġ_r) / Σ_r G_r
 //
-// Source   paper.tex "Ligament Heat Map"; the publication solves on the quartic elements, which leave the
-// hull. Limits   t = 0: the kernels themselves; t → ∞: w_s = m_s / Σ_r m_r with m_s = Σ M θ_s, on every
-// connected part. Units    t mm², radius mm, b 1/mm. Tests    tests/sim/surface/heat_map_test.cpp
+// Source   the publication, "Ligament Heat Map"; the publication solves on the quartic elements, which leave
+//          the hull.
+// Limits   t = 0: the kernels themselves; t → ∞: w_s = m_s / Σ_r m_r with m_s = Σ M θ_s, on every connected part.
+// Units    t mm², radius mm, b 1/mm.
+// Tests    tests/sim/surface/heat_map_test.cpp
 #pragma once
 
 #include <array>

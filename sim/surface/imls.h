@@ -11,7 +11,7 @@
 // Facts    a plane is reproduced exactly. On a sphere g is offset by about c h²/R (c = .083 smooth, .054
 //          literal), so contact subtracts the rest gap. |∇g| ≠ 1 away from the surface. Where no point is in
 //          reach g does not exist: GapJet::supported is false, and the caller decides.
-// Source   paper.tex "Skull", eq. of g_skull and θ.
+// Source   the publication, "Skull", eq. of g_skull and θ.
 // Tests    tests/sim/surface/imls_test.cpp
 #pragma once
 

@@ -10,7 +10,7 @@
 // The distance, and not a cheaper implicit function with unit slope at the surface only: penetration then has
 // the same meaning (mm along the normal) on every shape, so that κ and the onset do too, and R is an offset.
 //
-// Source  paper.tex "Contact" (finger as an implicit sphere). Skin under a finger and skin over a round skull
+// Source  the publication, "Contact" (finger as an implicit sphere). Skin under a finger and skin over a round skull
 //         both lie outside the ball, so they share Side::outside.
 // Smooth  sphere, plane and ellipsoid analytic, the capsule C¹ where its ends begin (the curvature jumps);
 //         all except where the nearest point is not unique, deep inside. At the centre of a sphere and on the

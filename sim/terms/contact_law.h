@@ -13,7 +13,7 @@
 // them, so a new shape needs nothing here. `inflation` ΔR [mm] is the amount by which the radius differs from
 // the shape's own.
 //
-// Source   paper.tex "Contact", "Friction"; deviations: κ in MPa/mm, C² onset, rest gap g₀ subtracted on the
+// Source   the publication, "Contact", "Friction"; deviations: κ in MPa/mm, C² onset, rest gap g₀ subtracted on the
 //          base, friction on the displacement of the step (the velocity form as printed is 1/dt too strong).
 // Units    κ [MPa/mm], ε [mm], f_n [MPa], x = X + u, c [mm], ε_v [mm/s].
 // Shapes   contact θ = κ, inflation, c [3], q [4]; friction θ = κ, inflation, μ, c [3], c_old [3], q [4],

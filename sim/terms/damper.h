@@ -10,7 +10,7 @@
 //   strang          1 − √α     √α       1 − √α    second order
 //   backward_euler  0          1/(1+r)  r/(1+r)   first order
 //
-// Source   paper.tex "Viscous Time Integration"; DESIGN section 2.
+// Source   the publication, "Viscous Time Integration" (`literal`); the others: sim/terms/README.md.
 // Tests    tests/sim/terms/skin_law_test.cpp (DamperOrder), law_edges_test.cpp (DamperNumbers)
 #pragma once
 

@@ -3,8 +3,10 @@
 //   prism    z = H = ∇u (9), e = Y = H + Hᵀ + HᵀH (6)        surface   z = e = u (3)
 //
 // Each kinematics gives e, ∂e/∂z, the geometric part σ·∂²e/∂z², and the change between natural and rest
-// directions. Source  paper.tex "Deformation Gradient", "Strain".  Tests
-// tests/sim/terms/term_kernels_test.cpp
+// directions.
+//
+// Source   the publication, "Deformation Gradient", "Strain"
+// Tests    tests/sim/terms/term_kernels_test.cpp
 #pragma once
 
 #include <cstring>

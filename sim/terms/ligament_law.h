@@ -1,11 +1,10 @@
 // Skin ligaments: zero-length springs from the inner surface to their anchors on the bone, per area.
 //
-//   exponential       Ψ = k/b (e^(b s) − 1),  s = √(d² + ε²) − ε,  d = |u|,  traction = k e^(b s) u / √(d² +
-//   ε²) fung_quadratic    Ψ = k/2b (e^(b d²) − 1),                               traction = k e^(b d²) u
+//   exponential      Ψ = k/b (e^(b s) − 1),    s = √(d² + ε²) − ε,  d = |u|,  traction = k e^(b s) u / √(d² + ε²)
+//   fung_quadratic   Ψ = k/2b (e^(b d²) − 1),                                 traction = k e^(b d²) u
 //
-// Source   paper.tex "Ligaments" for the exponential; deviation: the printed law is the limit ε → 0, whose
-// force
-//          is k at zero displacement (a cusp no gradient method can stop on); ε is a length, reported. The
+// Source   the publication, "Ligaments" for the exponential; deviation: the printed law is the limit ε → 0,
+//          whose force is k at zero displacement (a cusp no gradient method can stop on); ε is a length, reported. The
 //          quadratic one is the usual Fung spring: smooth, no threshold, stiffness k at rest.
 //          Beyond an exponent of 50 both exponentials are continued by their tangent, so that trial steps
 //          stay finite.

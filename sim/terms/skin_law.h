@@ -7,12 +7,12 @@
 // Only eigenvalues of C and of C (C^v)⁻¹ enter, so C^v = F^vᵀ F^v (6 numbers, det 1) is the whole history; it
 // is kept as C^v − I, and strain as Y = C − I, so that the rest state is exact.
 //
-// Source   paper.tex "Material Modeling", "Viscous Time Integration"; deviation: C^v instead of F^v
-// (identical to
-//          round-off), damper schemes other than `literal` (DESIGN section 2).
+// Source   the publication, "Material Modeling", "Viscous Time Integration"; deviation: C^v instead of F^v
+//          (identical to round-off), damper schemes other than `literal`.
 // Units    μ∞, μ_m, K [MPa], C [1], τ [s], dt [s]; ψ [MPa = mJ/mm³].
-// Shapes   e = Y [6] (xx yy zz xy xz yz), σ = ∂ψ/∂Y [6] (off-diagonal entries count both halves), history C^v
-// − I [6]. Smooth   analytic for J > 0; the caller rejects J ≤ 0. Tests    tests/sim/terms/skin_law_test.cpp
+// Shapes   e = Y [6] (xx yy zz xy xz yz), σ = ∂ψ/∂Y [6] (off-diagonal entries count both halves), history C^v − I [6].
+// Smooth   analytic for J > 0; the caller rejects J ≤ 0.
+// Tests    tests/sim/terms/skin_law_test.cpp
 #pragma once
 
 #include <array>

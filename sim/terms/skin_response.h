@@ -11,7 +11,7 @@
 // and the tangent is ½ Rᵀ diag-block(∂S/∂c, 2 (S_i − S_j)/(c_i − c_j)) R, R the change of Y to Qᵀ dY Q. The
 // Maxwell spring is the same on X = M C Mᵀ with q̃ = Mᵀ q for q, M = L⁻¹, Ĉ^v = L Lᵀ.
 //
-// Source   DESIGN section 2; Daleckii-Krein; Units and shapes as in skin_law.h; tangent [6][6] = ∂σ/∂Y.
+// Source   Daleckii-Krein; Units and shapes as in skin_law.h; tangent [6][6] = ∂σ/∂Y.
 // Smooth   divided differences without difference quotients where eigenvalues meet.
 // Tests    tests/sim/terms/skin_response_test.cpp
 #pragma once

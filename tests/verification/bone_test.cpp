@@ -1,4 +1,4 @@
-// The IMLS bone under convex skin (model-notes T3, T4, T17): how far its zero lies from the rest surface,
+// The IMLS bone under convex skin (T3, T4, T17): how far its zero lies from the rest surface,
 // that this gap makes no force, and what it would do if it did.
 #include <gtest/gtest.h>
 

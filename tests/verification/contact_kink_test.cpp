@@ -1,4 +1,4 @@
-// Derivatives where points begin to touch (model-notes T14): a plain penalty has a jump in its Hessian, so
+// Derivatives where points begin to touch (T14): a plain penalty has a jump in its Hessian, so
 // the derivative of any result by any parameter jumps whenever a point touches; a C² onset takes the jumps
 // away.
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Where the energy ends (model-notes T7): K/2 (J − 1)² is finite at J = 0 and beyond, and the stretches of C
+// Where the energy ends (T7): K/2 (J − 1)² is finite at J = 0 and beyond, and the stretches of C
 // do not know the sign of J. A state with an inverted point must be infinite, never be accepted, and the line
 // search must know how far it is.
 #include <gtest/gtest.h>

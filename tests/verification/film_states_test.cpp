@@ -1,4 +1,4 @@
-// What one element through a stiffness jump of 200:1 and more does to a film on a soft layer (model-notes
+// What one element through a stiffness jump of 200:1 and more does to a film on a soft layer (
 // T8), and which of two equilibria of a compressed film the minimiser takes (T13).
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// The ligament map between the strengths of its sources (B16, model-notes T9): any mesh, any diffusion time,
+// The ligament map between the strengths of its sources (B16, T9): any mesh, any diffusion time,
 // at the nodes and at the quadrature points.
 #include <gtest/gtest.h>
 

@@ -28,7 +28,7 @@ MaterialProgram program(const Mat3& f, std::array<bool, 3> free, double hold) {
   return p;
 }
 
-/// Kirchhoff stress in principal axes (numerics-notes B4): τ = 2 (μ∞ e^(Cq) + μ_m w) dev e + K J (J − 1) I,
+/// Kirchhoff stress in principal axes (B4): τ = 2 (μ∞ e^(Cq) + μ_m w) dev e + K J (J − 1) I,
 /// in long double.
 struct Principal {
   long double e, nu, stiffening, fraction;

@@ -1,4 +1,4 @@
-// Matrix functions where eigenvalues meet (model-notes T5): first divided differences of log and power to the
+// Matrix functions where eigenvalues meet (T5): first divided differences of log and power to the
 // last digit, and a tangent of the law that does not notice the gap.
 #include <gtest/gtest.h>
 

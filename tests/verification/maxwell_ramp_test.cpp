@@ -16,7 +16,7 @@ TEST(MaxwellRamp, EverySchemeFollowsItsRecurrence) {
   struct Row {
     const char* name;
     DamperScheme scheme;
-    double a, b, stated;  ///< stated: after step 12, numerics-notes B5; 0 = not there
+    double a, b, stated;  ///< stated: after step 12, the checklist, B5; 0 = not there
   };
   const Row rows[] = {{"exponential", DamperScheme::exponential, alpha, (1 - alpha) / r, 0.03990085},
                       {"literal", DamperScheme::literal, alpha, alpha, 0.03075346},

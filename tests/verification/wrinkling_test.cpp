@@ -1,4 +1,4 @@
-// When a film on a soft layer wrinkles (B10, numerics-notes 0.1): the compressive strain at which the
+// When a film on a soft layer wrinkles (B10): the compressive strain at which the
 // assembled raw Hessian of a strip of real elements stops being positive definite, and at which wavelength,
 // against the linearised bifurcation of stack_bifurcation.h.
 //
@@ -19,7 +19,7 @@ namespace rhytid::test {
 namespace {
 
 // The reference against what is known of it: a film on a half space, thin-film theory ε = ¼ (3
-// E_s/E_f)^(2/3), λ = 2π h (E_f/3E_s)^(1/3) to its own accuracy, and exact figures of numerics-notes for
+// E_s/E_f)^(2/3), λ = 2π h (E_f/3E_s)^(1/3) to its own accuracy, and exact figures computed apart for
 // finite layers.
 TEST(Wrinkling, TheReferenceKnowsFilmsOnHalfSpaces) {
   std::printf("film of 1 on a half space: strain, wavelength (thin-film theory)\n");
