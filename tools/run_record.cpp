@@ -28,7 +28,11 @@ ordered_json schemes(const Scene& scene) {
   j["damper"] = to_string(scene.time.damper);
   j["time"] =
       "one implicit step per substep; a step that fails is bisected, then started from softened contacts";
-  j["friction"] = "normal force and tangent plane lagged from the previous converged step";
+  const int passes = scene.time.lag_passes;
+  j["friction"] = passes == 1
+                      ? std::string("normal force and tangent plane lagged from the previous converged step")
+                      : "normal force and tangent plane lagged from the pass before, " +
+                            std::to_string(passes) + " passes a step";
   j["minimiser"] = scene.solver.minimiser;
   j["kernels"] = skin_kernel_isa();
   return j;

@@ -8,6 +8,7 @@
 #include "sim/core/units.h"
 #include "sim/mesh/surface_edges.h"
 #include "sim/scene/collider_motion.h"
+#include "sim/scene/parts/base_part.h"
 #include "sim/surface/heat_map.h"
 #include "sim/terms/contact_law.h"
 
@@ -167,8 +168,26 @@ std::vector<std::string> review_ligaments(const SceneModel& scene_model) {
   return warnings;
 }
 
+/// The gap at rest is subtracted: bone that lies lower than the skin acts as if it touched.
+void review_base(const SceneModel& scene_model, std::vector<std::string>& warnings) {
+  const Scene& scene = scene_model.scene();
+  // Where a plane lies says nothing: most scenes leave it at the origin.
+  if (!scene.base || scene.base->shape == ShapeKind::plane) return;
+  const auto [lowest, highest] = base_rest_gaps(scene_model.model());
+  const double allowed = 0.1 * skin_thickness(scene.skin);
+  if (highest > allowed)
+    warnings.push_back("/base: the bone lies up to " + length_text(highest) +
+                       " below the inner surface at rest; the gap at rest is subtracted, so that the skin is "
+                       "supported there as if the bone touched it");
+  if (lowest < -allowed)
+    warnings.push_back("/base: the bone reaches up to " + length_text(-lowest) +
+                       " into the skin at rest; the gap at rest is subtracted, so that the skin is supported "
+                       "there as if the bone ended at it");
+}
+
 std::vector<std::string> review_scene(const SceneModel& scene_model, const StepCost& cost) {
   std::vector<std::string> warnings;
+  review_base(scene_model, warnings);
   review_support(scene_model, cost, warnings);
   review_wrinkles(scene_model, warnings);
   for (const ColliderScene& c : scene_model.scene().colliders) review_collider(scene_model, c, warnings);

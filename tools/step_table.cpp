@@ -44,6 +44,7 @@ std::vector<CsvColumn> columns(const Model& model) {
   for (const std::string& name : summed_columns(model)) list.push_back({name, "mJ"});
   for (const char* name : {"iterations", "evaluations", "factorisations", "bisections", "softened"})
     list.push_back({name, ""});
+  list.push_back({"pass_change", "mm"});
   list.push_back({"residual", "N"});
   list.push_back({"tolerance", "N"});
   list.push_back({"smallest_pivot", "N_per_mm"});
@@ -93,8 +94,8 @@ void StepTable::add(const StepEvent& event) {
   for (const int n : {report.iterations, report.evaluations, report.factorisations, event.record.bisections,
                       event.record.softened ? 1 : 0})
     row.push_back(count(n));
-  for (const double value : {report.residual, report.tolerance, report.smallest_pivot,
-                             reading.smallest_jacobian, reading.largest_displacement})
+  for (const double value : {event.record.pass_change, report.residual, report.tolerance,
+                             report.smallest_pivot, reading.smallest_jacobian, reading.largest_displacement})
     row.emplace_back(value);
   for (const ContactReading& c : reading.contacts)
     for (const double value : {c.force[0], c.force[1], c.force[2], c.penetration}) row.emplace_back(value);
@@ -152,6 +153,7 @@ One row per converged step; the header carries the units. NAME stands for an ene
 | `factorisations` | | factorisations of the Hessian, likewise |
 | `bisections` | | how often the step was halved |
 | `softened` | | 1 when the step started from softened contacts |
+| `pass_change` | mm | how far the last of `/time/lag_passes` still moved the skin; 0 with one pass |
 | `residual` | N | norm of the gradient at the end |
 | `tolerance` | N | below which the step counts as converged |
 | `smallest_pivot` | N/mm | of the Hessian's factor; near 0: near to losing stability |

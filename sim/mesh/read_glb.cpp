@@ -174,7 +174,9 @@ class GlbReader {
       const Eigen::Affine3d transform = parent * local_transform(node);
       if (node.contains("mesh")) {
         if (node.contains("skin")) builder_.pass_over("skeletons (the rest pose is read)");
-        read_mesh(item("meshes", integer(node, "mesh", 0)), transform);
+        const json& mesh = item("meshes", integer(node, "mesh", 0));
+        refuse_weights(node.contains("weights") ? node : mesh);
+        read_mesh(mesh, transform);
       }
       const std::vector<long> children = integers(node, "children");
       for (auto child = children.rbegin(); child != children.rend(); ++child)
@@ -212,6 +214,14 @@ class GlbReader {
     return result;
   }
 
+  /// Shapes blended into the surface are not read: without weights they are not there.
+  void refuse_weights(const json& holder) const {
+    if (!holder.contains("weights") || !holder["weights"].is_array()) return;
+    for (const json& weight : holder["weights"])
+      if (weight.is_number() && weight.get<double>() != 0)
+        fail("morph targets with weights, which are not read; export the shape they make");
+  }
+
   void read_mesh(const json& mesh, const Eigen::Affine3d& transform) {
     if (!mesh.contains("primitives") || !mesh["primitives"].is_array()) fail("a mesh without primitives");
     for (const json& primitive : mesh["primitives"]) {
@@ -224,6 +234,7 @@ class GlbReader {
       }
       if (mode > 6) fail("a primitive of mode " + std::to_string(mode) + ", expected 0 to 6");
       if (!primitive["attributes"].contains("POSITION")) continue;  // nothing to draw, by the specification
+      if (primitive.contains("targets")) builder_.pass_over("morph targets (the shape without them is read)");
       read_primitive(primitive, mode, transform);
     }
   }

@@ -35,4 +35,18 @@ void refuse_doubtful_unit(const TriangleSurface& surface) {
                    " (a head is about 250 mm wide)");
 }
 
+void refuse_giant(const TriangleSurface& surface) {
+  if (surface.vertices.rows() == 0) return;
+  const double extent =
+      (surface.vertices.colwise().maxCoeff() - surface.vertices.colwise().minCoeff()).maxCoeff();
+  if (extent <= 5000) return;
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      ": extent %.4g m before the crop, expected at most 5 m; is mm_per_unit right (a head is about "
+      "250 mm wide)?",
+      extent / 1000);
+  throw InputError(surface.origin + text);
+}
+
 }  // namespace rhytid

@@ -164,7 +164,10 @@ void check_motion(const ColliderScene& collider, const std::string& file) {
     throw InputError(at + "/interpolation", "a spline through " + std::to_string(knots) + " knots",
                      "at most " + std::to_string(KnotPath::max_spline_knots) + ", or linear");
   for (std::size_t k = 1; k < knots; ++k) {
-    const double degrees = angle_between(collider.path[k - 1], collider.path[k]) * 180 / std::numbers::pi;
+    const PathKnot &before = collider.path[k - 1], &knot = collider.path[k];
+    // What is written as a turn by 300 degrees would be one by −60.
+    const double written = (knot.rotation - before.rotation).norm();
+    const double degrees = std::max(angle_between(before, knot), written) * 180 / std::numbers::pi;
     if (degrees > 170)
       throw InputError(at + "/path/" + std::to_string(k) + "/rotation",
                        "a turn by " + std::to_string(degrees) + " deg from the knot before",

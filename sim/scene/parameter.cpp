@@ -27,6 +27,11 @@ struct Kind {
 
 using enum ParameterTransform;
 
+/// A value of zero has no logarithm to be fitted by.
+double* of_positive(double& value) {
+  return value > 0 ? &value : nullptr;
+}
+
 // Bounds are wide physical ranges of skin; a fit usually narrows them.
 const Kind kinds[] = {
     {"/skin/layers/*/youngs_modulus", 1e-4, 1e3, log,
@@ -34,7 +39,7 @@ const Kind kinds[] = {
     {"/skin/layers/*/poissons_ratio", 0, 0.4999, logit,
      [](Scene& s, size_t i) { return &s.skin.layers[i].poissons_ratio; }},
     {"/skin/layers/*/stiffening", 0.25, 100, log,
-     [](Scene& s, size_t i) { return &s.skin.layers[i].stiffening; }},
+     [](Scene& s, size_t i) { return of_positive(s.skin.layers[i].stiffening); }},
     {"/skin/layers/*/relaxing_fraction", 1e-3, 0.999, logit,
      [](Scene& s, size_t i) {
        double& fraction = s.skin.layers[i].relaxing_fraction;
@@ -59,7 +64,7 @@ const Kind kinds[] = {
        return s.ligaments && !s.ligaments->map.empty() ? &s.ligaments->map_scale : nullptr;
      }},
     {"/ligaments/sources/*/strength", 1e-3, 1e2, log,
-     [](Scene& s, size_t i) { return &s.ligaments->sources[i].strength; }},
+     [](Scene& s, size_t i) { return of_positive(s.ligaments->sources[i].strength); }},
     {"/base/stiffness", 1e-3, 1e3, log,
      [](Scene& s, size_t) { return s.base ? &s.base->stiffness : nullptr; }},
     {"/colliders/*/radius", 0.1, 100, log,

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <numbers>
 
 #include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
@@ -43,6 +44,16 @@ Vec3 rotation_vector(const Eigen::Quaterniond& q) {
   return 2 * std::atan2(sine, q.w()) / sine * q.vec();
 }
 
+/// The same orientation, by as many whole turns more or less that it is nearest to `before`: knots that follow each
+/// other closely then do so as numbers, too.
+Vec3 nearest_turn(const Vec3& turn, const Vec3& before) {
+  const bool is_none = turn.norm() < 1e-12;
+  if (is_none && before.norm() < 1e-12) return turn;
+  const Vec3 axis = (is_none ? before : turn).normalized();
+  const double whole = 2 * std::numbers::pi;
+  return turn + std::round((before - turn).dot(axis) / whole) * whole * axis;
+}
+
 }  // namespace
 
 std::vector<PathKnot> read_path(const std::string& file) {
@@ -65,7 +76,8 @@ std::vector<PathKnot> read_path(const std::string& file) {
     if (!knots.empty() && value[0] <= knots.back().time)
       throw InputError(line.place, "time " + std::to_string(value[0]) + " s",
                        "a time later than that before");
-    knots.push_back({value[0], Vec3(value[1], value[2], value[3]), rotation_vector(q)});
+    const Vec3 before = knots.empty() ? Vec3(Vec3::Zero()) : knots.back().rotation;
+    knots.push_back({value[0], Vec3(value[1], value[2], value[3]), nearest_turn(rotation_vector(q), before)});
   });
   if (knots.empty()) throw InputError(file, "no knots", "a header and at least one line of numbers");
   return knots;

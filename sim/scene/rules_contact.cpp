@@ -47,7 +47,7 @@ std::vector<Rule> contact_rules() {
        .type = vector3,
        .dimension = dimension::length,
        .fallback = vector_json(base.centre),
-       .doc = "Centre of a sphere or a point of a plane."},
+       .doc = "Centre of a sphere. Where a plane lies has no effect: the gap at rest is subtracted."},
       {.pointer = "/base/radius",
        .type = number,
        .dimension = dimension::length,

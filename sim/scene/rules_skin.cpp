@@ -222,7 +222,7 @@ std::vector<Rule> skin_rules() {
            "Boundary condition on the rim of the patch. clamped: held. sliding: its wall moves only within "
            "itself; where the rim turns by more than 35 degrees (a corner) both in-plane directions are "
            "held. "
-           "free: not held."},
+           "free: not held. A rim that moves as prescribed: /skin/held, boxes around it with a path."},
       {.pointer = "/skin/held",
        .type = array,
        .min = 1,
@@ -263,7 +263,7 @@ std::vector<Rule> skin_rules() {
        .type = object,
        .doc = "Tension in the rest shape: how far the skin is stretched there from its unstressed state. "
               "Frame 0 "
-              "is then the relaxed equilibrium under that tension, the rim held."},
+              "is then the relaxed equilibrium under that tension, the rim as /skin/rim has it."},
       {.pointer = "/skin/pre_stretch/stretch",
        .type = number,
        .is_required = true,
@@ -332,8 +332,7 @@ std::vector<Rule> skin_rules() {
        .type = number,
        .fallback = layer.stiffening,
        .min = 0,
-       .min_is_open = true,
-       .doc = "C of the exponential (Fung) term; the model is meant for C >= 0.25."},
+       .doc = "C of the exponential (Fung) term; the model is meant for C >= 0.25. 0 is the Hencky law."},
       {.pointer = "/skin/layers/*/relaxing_fraction",
        .type = number,
        .fallback = layer.relaxing_fraction,
@@ -422,8 +421,7 @@ std::vector<Rule> ligament_rules() {
        .dimension = dimension::per_length,
        .fallback = source.strength,
        .min = 0,
-       .min_is_open = true,
-       .doc = "Exponent b at the source."},
+       .doc = "Exponent b at the source; where b is 0 ligaments pull with the same force at any length."},
       {.pointer = "/ligaments/sources/*/radius",
        .type = number,
        .dimension = dimension::length,

@@ -27,7 +27,7 @@ struct LayerScene {
   std::vector<double>
       thickness_by_vertex;    ///< mm, by vertex of the input surface, NaN = none; from that file
   int elements = 1;           ///< element layers (stacked)
-  int order = 2;              ///< q (stacked)
+  int order = 3;              ///< q (stacked); 2 locks near ν = ½ (tests/verification/README.md)
   double youngs_modulus = 0;  ///< MPa, instantaneous: mu = E / 2(1+nu), K = E / 3(1−2nu)
   double poissons_ratio = 0.49;
   double stiffening = 1;             ///< C of the Fung term

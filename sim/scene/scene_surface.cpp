@@ -67,6 +67,9 @@ TriangleSurface scene_surface(const SurfaceScene& s) {
   // Texture seams double vertices in glTF, which knows no other way.
   const bool has_seams = mesh.format.starts_with("binary glTF");
   if (s.coincident == "join" || (s.coincident == "auto" && has_seams)) join_coincident_vertices(mesh);
+  const bool is_cropped =
+      s.crop_centre || s.crop_low || !s.crop_vertices.empty() || !s.crop_vertices_file.empty();
+  if (is_cropped) refuse_giant(mesh);
   mesh = cropped(std::move(mesh), s);
   if (s.coincident == "auto") refuse_coincident_vertices(mesh);
   if (s.subdivide > 0) return subdivide_surface(mesh, s.subdivide);

@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <vector>
 
 #include "sim/core/units.h"
 #include "sim/scene/load.h"
+#include "sim/scene/names.h"
 #include "sim/scene/skin_rule.h"
 
 namespace rhytid {
@@ -63,6 +65,60 @@ void warn_of_wrinkling_stack(const SkinScene& skin, std::vector<std::string>& wa
                                 " through several layers delays wrinkling 3 to 9 times; take 3 or 4"));
 }
 
+/// Squeezed between finger and bone a nearly incompressible layer must bulge, which takes a cubic (figures:
+/// tests/verification/README.md, Locking).
+void warn_of_locking(const SkinScene& skin, std::vector<std::string>& warnings) {
+  if (skin.volume == VolumeQuadrature::reduced || skin.scheme != ThicknessScheme::stacked) return;
+  for (size_t i = 0; i < skin.layers.size(); ++i) {
+    const LayerScene& layer = skin.layers[i];
+    // A film that is bent, not squeezed, does not mind.
+    const bool is_film = i > 0 && layer.thickness < 0.5 * skin.layers[i - 1].thickness;
+    if (layer.order < 3 && layer.elements == 1 && layer.poissons_ratio >= 0.45 && !is_film)
+      warnings.push_back(sentence("/skin/layers/", layer.name, "/order: ", layer.order,
+                                  " locks at a Poisson's ratio of ", layer.poissons_ratio,
+                                  ": squeezed skin comes out up to twice as stiff; take order 3, or a "
+                                  "reduced volume"));
+  }
+}
+
+/// What another shape would read: given, and without effect.
+struct ShapeKey {
+  const char* key;
+  bool is_given;
+  std::vector<ShapeKind> shapes;  ///< that read it
+};
+
+void warn_of_unused(const std::string& at, ShapeKind shape, const std::vector<ShapeKey>& keys,
+                    std::vector<std::string>& warnings) {
+  for (const auto& [key, is_given, shapes] : keys)
+    if (is_given && std::find(shapes.begin(), shapes.end(), shape) == shapes.end())
+      warnings.push_back(sentence(at, "/", key, ": is not used, since the shape is ", to_string(shape)));
+}
+
+void warn_of_unused_keys(const Scene& scene, std::vector<std::string>& warnings) {
+  using enum ShapeKind;
+  if (scene.base) {
+    const BaseScene &base = *scene.base, plain;
+    warn_of_unused("/base", base.shape,
+                   {{"radius", base.radius != plain.radius, {sphere}},
+                    {"centre", base.centre != plain.centre, {sphere}},
+                    {"normal", base.normal != plain.normal, {plane}},
+                    {"imls_support", base.imls_support != plain.imls_support, {imls}},
+                    {"imls_kernel", base.imls_kernel != plain.imls_kernel, {imls}}},
+                   warnings);
+  }
+  for (const ColliderScene& collider : scene.colliders) {
+    const ColliderScene plain;
+    warn_of_unused("/colliders/" + collider.name, collider.shape,
+                   {{"radius", collider.radius != plain.radius, {sphere, capsule}},
+                    {"length", collider.length != plain.length, {capsule}},
+                    {"axis", collider.axis != plain.axis, {capsule}},
+                    {"semi_axes", collider.semi_axes != plain.semi_axes, {ellipsoid}},
+                    {"normal", collider.normal != plain.normal, {plane}}},
+                   warnings);
+  }
+}
+
 /// Rules that the energy of in-plane strains is too much for: it comes out too low, near ν = ½ most.
 void warn_of_quadrature(const SkinScene& skin, std::vector<std::string>& warnings) {
   for (const SkinRuleCheck& check : check_skin_rules(skin))
@@ -113,6 +169,8 @@ std::vector<std::string> scene_warnings(const Scene& scene) {
   std::vector<std::string> warnings;
   for (const LayerScene& layer : scene.skin.layers) warn_of_layer(layer, scene, warnings);
   warn_of_wrinkling_stack(scene.skin, warnings);
+  warn_of_locking(scene.skin, warnings);
+  warn_of_unused_keys(scene, warnings);
   warn_of_quadrature(scene.skin, warnings);
   for (const ColliderScene& collider : scene.colliders) warn_of_collider(collider, scene.time, warnings);
   if (scene.time.frames == 0)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -46,7 +47,8 @@ class CloudReader {
   }
 
   PointCloud read() {
-    const std::string ending = path_.substr(std::min(path_.rfind('.'), path_.size()));
+    std::string ending = path_.substr(std::min(path_.rfind('.'), path_.size()));
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     if (ending == ".ply") {
       read_ply();
     } else if (ending == ".obj") {

@@ -21,6 +21,12 @@ void RunOptions::validate() const {
 
 namespace {
 
+/// Of the vectors [nodes·3].
+double largest_length(const VectorXd& vectors) {
+  return std::sqrt(
+      Eigen::Map<const MatrixX3>(vectors.data(), vectors.size() / 3, 3).rowwise().squaredNorm().maxCoeff());
+}
+
 /// The steps of a run one after the other.
 class Runner {
  public:
@@ -105,6 +111,8 @@ class Runner {
       given_up = {};
       State next = solver_.problem().advance(solver_.displacement());
       StepRecord record{step, frame, depth - depth_used, softened, {}, std::move(report)};
+      if (!solver_.earlier_passes().empty())
+        record.pass_change = largest_length(solver_.displacement() - solver_.earlier_passes().back());
       if (options_.account_energies) record.energies = account_step(solver_.problem(), next);
       const bool frame_done = pending.empty() && ends_frame;
       if (observer_.step) observer_.step({solver_.problem(), next, record, frame_done});

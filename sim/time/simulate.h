@@ -39,6 +39,9 @@ struct StepRecord {
   bool softened = false;   ///< its start came from softened penalties (the equations solved are the scene's)
   State state;             ///< after the step (empty when states are not kept)
   MinimiserReport report;  ///< of the last pass, with the counts of all, and the work of attempts given up
+  /// How far the last pass moved the skin, largest displacement, mm: what is left of the fixed-point iteration
+  /// over the lag of friction. 0 with one pass.
+  double pass_change = 0;
   /// Displacements at which the passes before the last ended (empty when states are not kept, or for one
   /// pass).
   std::vector<VectorXd> earlier_passes = {};

@@ -74,6 +74,17 @@ TEST(BundledScenes, head_rests_in_equilibrium) {
   }
 }
 
+TEST(SceneReview, says_when_bone_and_skin_are_apart_at_rest) {
+  const auto sphere = [](const std::string& height) {
+    return std::vector<std::string>{R"(/base={"shape": "sphere", "radius": "200 mm", "centre": [0, 0, )" +
+                                    height + "]}"};
+  };
+  EXPECT_THAT(review(sphere("-206")),
+              Contains(HasSubstr("below the inner surface at rest; the gap at rest is")));
+  EXPECT_THAT(review(sphere("-200.5")), Contains(HasSubstr("into the skin at rest")));
+  EXPECT_THAT(review({}), Not(Contains(HasSubstr("the gap at rest is subtracted"))));
+}
+
 TEST(BundledScenes, residual_is_seen_when_the_rest_state_is_none) {
   const SceneModel scene_model(small_scene({"/colliders/finger/path/0/position=[-2, 0, 4.5]"}));
   const StepCost cost = measure_step_cost(scene_model);

@@ -57,7 +57,7 @@ void add_materials(CaseList& list) {
                damper == "exponential" && std::abs(power) == 6);
     }
   }
-  list.add("stiffening C", "0", {"/skin/layers/soft/stiffening=0"}, true, CaseList::refused);
+  list.add("stiffening C", "0", {"/skin/layers/soft/stiffening=0", "/skin/layers/film/stiffening=0"}, true);
   list.sweep("stiffening C", {1e-9, 1e-3, 0.25, 1, 5, 20},
              {"/skin/layers/soft/stiffening=", "/skin/layers/film/stiffening="}, {20});
   list.sweep("relaxing fraction", {0, 1e-9, 0.5, 0.999, 0.999999},
@@ -70,7 +70,8 @@ void add_materials(CaseList& list) {
 }
 
 void add_ligaments(CaseList& list) {
-  list.add("ligament b, 1/mm", "0", {"/ligaments/sources/right/strength=0"}, true, CaseList::refused);
+  list.add("ligament b, 1/mm", "0",
+           {"/ligaments/sources/left/strength=0", "/ligaments/sources/right/strength=0"}, true);
   list.sweep("ligament b, 1/mm", {1e-6, 1e-3, 1, 10, 100, 1e3, 1e4},
              {"/ligaments/sources/left/strength=", "/ligaments/sources/right/strength="}, {1e4});
   list.sweep("ligament eps, mm", {1e-8, 1e-6, 1e-4, 1e-2, 1}, {"/ligaments/smoothing="}, {1e-6});

@@ -1,6 +1,10 @@
 #include "sim/scene/parts/base_part.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "sim/core/error.h"
+#include "sim/core/units.h"
 #include "sim/surface/imls.h"
 #include "sim/surface/point_cloud.h"
 #include "sim/surface/shapes.h"
@@ -32,17 +36,25 @@ std::shared_ptr<const ImplicitShape> base_shape(const BaseScene& base, const Ski
 }
 
 /// Bone whose normals point away from the skin would pull instead of push: refused.
-void refuse_inside_out(const ImplicitShape& shape, const SkinMesh& mesh, const std::string& file) {
+void refuse_inside_out(const ImplicitShape& shape, const SkinMesh& mesh, const Vec3& centre,
+                       const Scene& scene) {
+  const BaseScene& base = *scene.base;
   const MatrixX3 inner = inner_rest_nodes(mesh);
   int towards = 0, away = 0;
   for (int column = 0; column < mesh.num_columns; ++column) {
     const Vec3 x = inner.row(column), n = mesh.column_normals.row(column);
-    const GapJet jet = shape.evaluate(x);
+    const GapJet jet = shape.evaluate(x - centre);
     if (jet.supported) ++(jet.gradient.dot(n) > 0 ? towards : away);
   }
-  if (away > towards)
-    throw InputError(file, "normals that point away from the skin",
+  if (away <= towards) return;
+  if (base.points)
+    throw InputError(base.points->file, "normals that point away from the skin",
                      "normals out of the bone, towards the skin");
+  const bool is_plane = base.shape == ShapeKind::plane;
+  throw InputError(
+      (scene.file.empty() ? "" : scene.file + ": ") + (is_plane ? "/base/normal" : "/base/centre"),
+      is_plane ? "a plane that faces away from the skin" : "a sphere whose far side the skin is on",
+      "bone under the inner surface, facing it");
 }
 
 /// An IMLS surface stands where its points are; the others are moved to their centre.
@@ -60,8 +72,8 @@ void BasePart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
   const BaseScene& b = *scene.base;
   model.shapes.push_back(base_shape(b, model.mesh));
   const ImplicitShape* shape = model.shapes.back().get();
-  if (b.points) refuse_inside_out(*shape, model.mesh, b.points->file);
   const Vec3 centre = base_centre(b);
+  refuse_inside_out(*shape, model.mesh, centre, scene);
   Term term("base contact", contact_kernels(), ContactLaw{shape, b.onset});
   TermGroup g = surface_group(model.mesh, SkinSide::inner, triangle_rule(contact_degree(scene)));
   // Rest gap subtracted: the rest state is an exact equilibrium whatever the shape makes of the rest nodes.
@@ -69,8 +81,12 @@ void BasePart::add_terms(const Scene& scene, Model& model, std::vector<FeatureNo
     const Vec3 x(g.rest[4 * q], g.rest[4 * q + 1], g.rest[4 * q + 2]);
     const GapJet jet = shape->evaluate(x - centre);
     if (!jet.supported)
-      throw InputError(scene.file + ": /base/imls_support", std::to_string(b.imls_support) + " mm",
-                       "a support that reaches every point of the inner surface");
+      throw InputError(
+          scene.file + ": /base/imls_support",
+          format_quantity(dynamic_cast<const ImlsSurface&>(*shape).support(), dimension::length) +
+              (b.imls_support > 0 ? "" : " (three times the spacing of the points)"),
+          "a support that reaches every point of the inner surface" +
+              std::string(b.points ? "; do unit and place of the points agree with the skin's?" : ""));
     g.rest[4 * q + 3] = jet.gap;
   }
   const int base = model.native_block("base").offset;
@@ -89,6 +105,21 @@ void BasePart::set_native(const Scene& scene, const Model& model, VectorXd& nati
   const int at = model.native_block("base").offset;
   native[at] = scene.base->stiffness;
   native.segment<3>(at + 2) = base_centre(*scene.base);
+}
+
+std::pair<double, double> base_rest_gaps(const Model& model) {
+  std::pair<double, double> range{std::numeric_limits<double>::infinity(),
+                                  -std::numeric_limits<double>::infinity()};
+  for (const Term& term : model.terms) {
+    if (term.name() != "base contact") continue;
+    for (const TermGroup& g : term.groups())
+      for (std::size_t q = 0; q < g.weight.size(); ++q) {
+        range.first = std::min(range.first, g.rest[4 * q + 3]);
+        range.second = std::max(range.second, g.rest[4 * q + 3]);
+      }
+  }
+  require(range.first <= range.second, "base_rest_gaps: the model has no base");
+  return range;
 }
 
 bool BasePart::add_derivative(const Scene&, const Model& model, const std::string& address,

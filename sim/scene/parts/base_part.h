@@ -3,6 +3,8 @@
 // Native block "base": κ, inflation, centre [3].
 #pragma once
 
+#include <utility>
+
 #include "sim/scene/parts/scene_part.h"
 
 namespace rhytid {
@@ -16,5 +18,9 @@ class BasePart final : public ScenePart {
   bool add_derivative(const Scene& scene, const Model& model, const std::string& address,
                       VectorXd& derivative) const override;
 };
+
+/// Smallest and largest gap between the inner surface at rest and the base, mm, over the points of contact; both
+/// are subtracted there, so that rest is an equilibrium. Needs the terms of a BasePart in the model.
+std::pair<double, double> base_rest_gaps(const Model& model);
 
 }  // namespace rhytid

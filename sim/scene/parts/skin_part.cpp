@@ -67,16 +67,20 @@ Term skin_term(const Scene& scene, bool viscous) {
 
 }  // namespace
 
-SkinMesh build_skin_mesh(const Scene& scene) {
-  const SkinScene& skin = scene.skin;
+SkinMesh build_skin_mesh(Scene& scene) {
+  SkinScene& skin = scene.skin;
   const TriangleSurface surface = scene_surface(skin.surface);
   ExtrusionOptions options;
   options.order = skin.order;
-  for (const LayerScene& l : skin.layers) {
+  for (LayerScene& l : skin.layers) {
+    VectorXd by_vertex;
+    if (!l.thickness_by_vertex.empty()) {
+      by_vertex = on_surface_vertices(surface, l.thickness_by_vertex,
+                                      scene.file + ": /skin/layers/" + l.name + "/thickness_map");
+      l.thickness = by_vertex.mean();
+    }
     options.layers.push_back({l.thickness, l.elements, l.order});
-    if (!l.thickness_by_vertex.empty())
-      options.layers.back().by_vertex = on_surface_vertices(
-          surface, l.thickness_by_vertex, scene.file + ": /skin/layers/" + l.name + "/thickness_map");
+    options.layers.back().by_vertex = std::move(by_vertex);
   }
   options.composite = skin.scheme == ThicknessScheme::composite;
   options.composite_order = skin.composite_order;

@@ -9,7 +9,7 @@
 namespace rhytid {
 
 /// The prism mesh of a scene: reads or makes the surface, crops, bends, extrudes. Throws InputError.
-SkinMesh build_skin_mesh(const Scene& scene);
+SkinMesh build_skin_mesh(Scene& scene);
 
 class SkinPart final : public ScenePart {
  public:

@@ -78,6 +78,20 @@ TEST(ReadSurface, FansQuadranglesAndLargerPolygons) {
   EXPECT_EQ(msh.file_face(1), 5);
 }
 
+TEST(ReadSurface, RefusesGiantsBeforeACropFindsNothing) {
+  TriangleSurface head = wavy_patch();
+  SurfaceScene scene;
+  scene.file = write_file("giant.obj", as_obj(head));
+  scene.mm_per_unit = 1000;
+  scene.crop_centre = Vec3(0, 0, 0);
+  scene.crop_radius = 20;
+  for (const char* by : {"geodesic", "distance"}) {
+    scene.crop_by = by;
+    EXPECT_THAT(input_error([&] { (void)scene_surface(scene); }),
+                AllOf(HasSubstr("giant.obj: extent "), HasSubstr("is mm_per_unit right")));
+  }
+}
+
 // Rotation by 90° about z, then doubling, then a shift: x ↦ 2 (−y, x, z) + (1, 2, 3).
 TEST(ReadGlb, AppliesNodeTransformsBothWays) {
   const TriangleSurface patch = wavy_patch();
@@ -106,6 +120,14 @@ TEST(ReadGlb, MirroredNodesKeepTheSurfaceFacingOut) {
   const auto normal_z = [](const TriangleSurface& s) { return vertex_normals(s, 0).col(2).mean(); };
   EXPECT_GT(normal_z(patch), 0.9);
   EXPECT_GT(normal_z(mirrored), 0.9);
+}
+
+TEST(ReadGlb, RefusesShapesThatOnlyWeightsWouldMake) {
+  const TriangleSurface patch = wavy_patch();
+  EXPECT_THAT(refusal_of("glb", as_glb(patch, {{"weights", {0, 0.5}}})),
+              HasSubstr("morph targets with weights"));
+  EXPECT_EQ(read_surface(write_file("neutral.glb", as_glb(patch, {{"weights", {0, 0}}})), 1).vertices,
+            patch.vertices);
 }
 
 TEST(ReadGlb, JoinsTheSeamsThatTexturesMake) {

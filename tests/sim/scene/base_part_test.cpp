@@ -90,7 +90,38 @@ TEST(BasePart, RefusesCloudsThatAreNoBoneOfThisSkin) {
   EXPECT_THAT(refusal({points(folder / "absent.xyz")}), HasSubstr("absent.xyz"));
   std::ofstream(folder / "far.xyz") << "1 0 0 0 0 1\n1.001 0 0 0 0 1\n";
   EXPECT_THAT(refusal({points(folder / "far.xyz")}), HasSubstr("/base/imls_support"));
+  EXPECT_THAT(refusal({"/base/imls_support=0", points(folder / "far.xyz")}),
+              HasSubstr("got 3 mm (three times the spacing of the points)"));
   EXPECT_THAT(refusal({"/base/shape=plane", points(folder / "far.xyz")}), HasSubstr("only the shape imls"));
+  // The ending in capitals is the same format.
+  EXPECT_EQ(refusal({"/base/imls_support=5", points(write_inner(own.model().mesh, folder / "in.XYZ", 1))}),
+            "not refused");
+}
+
+TEST(BasePart, RefusesShapesThatFaceAway) {
+  const auto refusal = [](const std::vector<std::string>& settings) -> std::string {
+    try {
+      (void)pressed_skin(settings);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "not refused";
+  };
+  EXPECT_EQ(refusal({"/base/shape=plane"}), "not refused");
+  EXPECT_THAT(refusal({"/base/shape=plane", "/base/normal=[0, 0, -1]"}),
+              HasSubstr("bone.json: /base/normal: got a plane that faces away from the skin"));
+  EXPECT_EQ(refusal({"/base/shape=sphere", "/base/radius=20"}), "not refused");
+  EXPECT_THAT(refusal({"/base/shape=sphere", "/base/radius=5", "/base/centre=[0, 0, 60]"}),
+              HasSubstr("/base/centre"));
+}
+
+TEST(BasePart, SaysHowFarTheBoneIsFromTheSkinAtRest) {
+  const auto [lowest, highest] =
+      base_rest_gaps(pressed_skin({"/base/shape=sphere", "/base/radius=20"}).model());
+  // The inner surface is a cylinder of 23.5 mm, 8 mm wide, with facets.
+  EXPECT_NEAR(lowest, 3.5, 0.3);
+  EXPECT_LT(lowest, highest);
+  EXPECT_NEAR(highest, std::hypot(23.5, 4) - 20, 0.3);
 }
 
 }  // namespace

@@ -80,6 +80,13 @@ TEST(ColliderMotion, RefusesAmbiguousTurns) {
   EXPECT_THAT(refusal({R"(/colliders/finger/path=[{"time": 0, "position": [0, 0, 6]},
       {"time": 1, "position": [2, 0, 6], "rotation": ["175 deg", 0, 0]}])"}),
               HasSubstr("put a knot between"));
+  // The way round is taken as written: not the shorter one in silence, and a whole turn is none.
+  for (const std::string angle : {"300 deg", "360 deg", "-200 deg"})
+    EXPECT_THAT(refusal({R"(/colliders/finger/path=[{"time": 0, "position": [0, 0, 6]},
+        {"time": 1, "position": [2, 0, 6], "rotation": [0, 0, ")" +
+                         angle + R"("]}])"}),
+                HasSubstr("put a knot between"))
+        << angle;
 }
 
 class PathFile : public testing::Test {
@@ -109,6 +116,15 @@ TEST_F(PathFile, HoldsTimesPlacesAndOrientations) {
   const Scene again = parse_scene(scene_to_json(scene), "again.json");
   ASSERT_EQ(again.colliders[0].path.size(), 2u);
   EXPECT_EQ(again.colliders[0].path[1].rotation, path[1].rotation);
+  // A finger that keeps turning passes half and whole turns.
+  std::string turning = "time,x,y,z,qw,qx,qy,qz\n";
+  for (int k = 0; k <= 12; ++k) {
+    const double half = k * std::numbers::pi / 8;  // 45 degrees a knot
+    turning += std::to_string(k) + ",0,0,6," + std::to_string(std::cos(half)) + ",0,0," +
+               std::to_string(std::sin(half)) + "\n";
+  }
+  const auto turns = scene_with(with(turning)).colliders[0].path;
+  EXPECT_NEAR(turns.back().rotation.z(), 12 * std::numbers::pi / 4, 1e-5);
   EXPECT_EQ(scene_with(with("z,y,x,time\n3,2,1,0\n")).colliders[0].path[0].position, Vec3(1, 2, 3));
 }
 

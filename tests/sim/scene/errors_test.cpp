@@ -189,9 +189,16 @@ TEST(SceneWarnings, NameWhatIsDoubtful) {
   // An elastic layer has no relaxation time to identify.
   EXPECT_THAT(warnings({"/skin/layers/film/relaxation_time=8 ms", "/skin/layers/film/relaxing_fraction=0"}),
               ElementsAre());
-  EXPECT_THAT(warnings({"/skin/layers/soft/order=2"}), ElementsAre(HasSubstr("delays wrinkling")));
+  EXPECT_THAT(warnings({"/skin/layers/soft/order=2"}),
+              ElementsAre(HasSubstr("delays wrinkling"), HasSubstr("/skin/layers/soft/order: 2 locks")));
+  EXPECT_THAT(warnings({"/skin/layers/soft/order=2", "/skin/quadrature/volume=reduced"}),
+              ElementsAre(HasSubstr("delays wrinkling")));
   EXPECT_THAT(warnings({"/skin/scheme=composite", "/skin/composite_order=2"}),
               ElementsAre(HasSubstr("3 or 4")));
+  // What another shape would read.
+  EXPECT_THAT(warnings({"/colliders/finger/length=3", "/colliders/finger/semi_axes=[1, 2, 3]"}),
+              ElementsAre("/colliders/finger/length: is not used, since the shape is sphere",
+                          "/colliders/finger/semi_axes: is not used, since the shape is sphere"));
   EXPECT_THAT(warnings({"/colliders/finger/path/1/position/0=100 mm"}),
               ElementsAre(HasSubstr("moves 4.167 mm in one step")));
   EXPECT_THAT(warnings({"/colliders/table/path/0/time=9"}), ElementsAre(HasSubstr("never moves")));

@@ -58,12 +58,13 @@ TEST(SceneSchema, RejectsWhatTheValidatorRejects) {
   const json others =
       parse(R"([null, true, "", "x", "clamped", -1, 0, 0.5, 1, 3.5, 1e7, 1e300, [], [1], [1, 2, 3], {},
                                 {"name": "x"}, "1 mm", "/"])");
-  // Rules over several values (unique names, increasing times, directions, the radius of a spherical base,
+  // Rules over several values (unique names, increasing times, directions, turns, the radius of a spherical base,
   // quadrature) and the dimension of a unit are beyond a schema.
   const auto is_beyond = [](const std::string& pointer, const json& value) {
     return value == "1 mm" || value == "x" || pointer.ends_with("/name") || pointer.ends_with("/time") ||
            pointer.find("/normal") != std::string::npos || pointer.find("/axis") != std::string::npos ||
-           pointer == "/base/radius" || pointer.starts_with("/skin/quadrature/");
+           pointer.find("/rotation") != std::string::npos || pointer == "/base/radius" ||
+           pointer.starts_with("/skin/quadrature/");
   };
   int rejected = 0, compared = 0;
   const json pointers = scene.flatten();
