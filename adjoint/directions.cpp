@@ -1,0 +1,109 @@
+#include "adjoint/directions.h"
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "sim/core/error.h"
+
+namespace rhytid::adjoint {
+namespace {
+
+/// Singular values below this part of the largest are zero within the accuracy of the tangent sweep.
+constexpr double kNullTolerance = 1e-8;
+/// A direction with more than this part of its length along null vectors is open.
+constexpr double kOpen = 1e-6;
+/// Components of a direction below this part of its largest one are left out of sentences.
+constexpr double kMentioned = 0.3;
+/// And so are all beyond this many; the sentence then says how many they are.
+constexpr int kMentionedAtMost = 8;
+
+}  // namespace
+
+MatrixXd Directions::basis() const {
+  return right_vectors.leftCols(rank) * singular_values.head(rank).cwiseInverse().asDiagonal();
+}
+
+bool Directions::is_open(const VectorXd& g) const {
+  const VectorXd null_part = right_vectors.rightCols(right_vectors.cols() - rank).transpose() * g;
+  return null_part.size() > 0 && null_part.cwiseAbs().maxCoeff() > kOpen * g.norm();
+}
+
+Directions directions_of(const MatrixXd& jacobian) {
+  const Eigen::Index n = jacobian.cols();
+  require(jacobian.rows() >= n && jacobian.allFinite(), "directions_of: Jacobian is wide or not finite");
+  Directions d;
+  if (n == 0) return d;
+  const Eigen::JacobiSVD<MatrixXd> svd(jacobian, Eigen::ComputeThinV);
+  d.singular_values = svd.singularValues();
+  d.right_vectors = svd.matrixV();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    Eigen::Index largest;  // the sign of a singular vector is free
+    d.right_vectors.col(i).cwiseAbs().maxCoeff(&largest);
+    if (d.right_vectors(largest, i) < 0) d.right_vectors.col(i) *= -1;
+  }
+  while (d.rank < n && d.singular_values[d.rank] > kNullTolerance * d.singular_values[0]) ++d.rank;
+  return d;
+}
+
+bool lead_null_space(Directions& d, const VectorXd& direction) {
+  const Eigen::Index n = d.right_vectors.cols(), count = n - d.rank;
+  const double length = direction.norm();
+  if (count == 0 || !(length > 0)) return false;
+  const MatrixXd null_vectors = d.right_vectors.rightCols(count);
+  const VectorXd inside = null_vectors.transpose() * direction;
+  if ((null_vectors * inside - direction).norm() > kOpen * length) return false;
+  // The first column of Q is the direction, up to its sign; the others complete the basis.
+  MatrixXd first = MatrixXd::Identity(count, count);
+  first.col(0) = inside / inside.norm();
+  if (count > 1) {
+    Eigen::Index largest;
+    inside.cwiseAbs().maxCoeff(&largest);
+    if (largest != 0) first.col(largest) = VectorXd::Unit(count, 0);
+  }
+  MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(first).householderQ();
+  d.right_vectors.rightCols(count) = null_vectors * Q;
+  for (Eigen::Index i = d.rank; i < n; ++i) {
+    Eigen::Index largest;
+    d.right_vectors.col(i).cwiseAbs().maxCoeff(&largest);
+    if (d.right_vectors(largest, i) < 0) d.right_vectors.col(i) *= -1;
+  }
+  return true;
+}
+
+std::string direction_in_words(const VectorXd& direction, const std::vector<std::string>& names) {
+  std::vector<int> order(direction.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return std::fabs(direction[a]) > std::fabs(direction[b]); });
+  std::string up, down;
+  int mentioned = 0, more = 0;
+  for (const int k : order) {
+    if (std::fabs(direction[k]) < kMentioned * std::fabs(direction[order.front()])) break;
+    if (mentioned == kMentionedAtMost) {
+      ++more;
+      continue;
+    }
+    std::string& list = direction[k] > 0 ? up : down;
+    list += (list.empty() ? "" : ", ") + names[k];
+    ++mentioned;
+  }
+  if (more > 0) (down.empty() ? up : down) += " and " + std::to_string(more) + " more";
+  if (mentioned == 1) return up + " is not determined: changing it";
+  if (down.empty()) return up + " go together: raising all of them";
+  return up + " trade off against " + down + ": raising the former while lowering the latter";
+}
+
+MatrixXd stacked_root(const MatrixXd& A, const MatrixXd& B) {
+  const Eigen::Index n = B.cols();
+  require(A.size() == 0 || A.cols() == n, "stacked_root: as many columns above as below");
+  MatrixXd stacked = MatrixXd::Zero(std::max(n, (A.size() == 0 ? 0 : A.rows()) + B.rows()), n);
+  if (A.size() > 0) stacked.topRows(A.rows()) = A;
+  stacked.middleRows(A.size() == 0 ? 0 : A.rows(), B.rows()) = B;
+  const Eigen::HouseholderQR<MatrixXd> qr(stacked);
+  return qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+}
+
+}  // namespace rhytid::adjoint
