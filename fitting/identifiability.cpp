@@ -1,24 +1,17 @@
 #include "fitting/identifiability.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <numeric>
 
+#include "adjoint/directions.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
 namespace {
 
-/// Singular values below this part of the largest are zero within the accuracy of the tangent sweep.
-constexpr double kNullTolerance = 1e-8;
-/// Components of a direction below this part of its largest one are left out of sentences.
-constexpr double kMentioned = 0.3;
-/// And so are all beyond this many; the sentence then says how many they are.
-constexpr int kMentionedAtMost = 8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::string format(const char* pattern, double x) {
@@ -43,13 +36,6 @@ double student_within(double t, double v) {
   return 2 * sum * step / 3 / std::beta(0.5 * v, 0.5);
 }
 
-/// How many singular values, descending, are not zero.
-int rank_of(const VectorXd& singular_values) {
-  int rank = 0;
-  while (rank < singular_values.size() && singular_values[rank] > kNullTolerance * singular_values[0]) ++rank;
-  return rank;
-}
-
 }  // namespace
 
 Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<FitVariable>& variables,
@@ -66,17 +52,11 @@ Identifiability::Identifiability(const MatrixXd& jacobian, const std::vector<Fit
   for (int k = 0; k < n; ++k)
     if (variables[k].transform == ParameterTransform::none)
       scale_[k] = variables[k].upper - variables[k].lower;
-  const Eigen::JacobiSVD<MatrixXd> svd(jacobian * scale_.asDiagonal(), Eigen::ComputeThinV);
-  singular_values_ = svd.singularValues();
-  right_vectors_ = svd.matrixV();
-  for (int i = 0; i < n; ++i) {
-    Eigen::Index largest;  // the sign of a singular vector is free: make its largest component positive
-    right_vectors_.col(i).cwiseAbs().maxCoeff(&largest);
-    if (right_vectors_(largest, i) < 0) right_vectors_.col(i) *= -1;
-  }
-  rank_ = rank_of(singular_values_);
-  basis_ = scale_.asDiagonal() * right_vectors_.leftCols(rank_) *
-           singular_values_.head(rank_).cwiseInverse().asDiagonal();
+  const adjoint::Directions directions = adjoint::directions_of(jacobian * scale_.asDiagonal());
+  singular_values_ = directions.singular_values;
+  right_vectors_ = directions.right_vectors;
+  rank_ = directions.rank;
+  basis_ = scale_.asDiagonal() * directions.basis();
   misfit_ = SpatialMisfit(tracks, basis_);
   if (rank_ == 0) return;
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(misfit_.covariance());
@@ -152,31 +132,12 @@ bool Identifiability::determined(int parameter) const {
 }
 
 std::string Identifiability::direction_in_words(int i) const {
-  const VectorXd v = right_vectors_.col(i);
-  std::vector<int> order(v.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return std::fabs(v[a]) > std::fabs(v[b]); });
-  std::string up, down;
-  int mentioned = 0, more = 0;
-  for (const int k : order) {
-    if (std::fabs(v[k]) < kMentioned * std::fabs(v[order.front()])) break;
-    if (mentioned == kMentionedAtMost) {
-      ++more;
-      continue;
-    }
-    std::string& list = v[k] > 0 ? up : down;
-    list += (list.empty() ? "" : ", ") + variables_[k].name;
-    ++mentioned;
-  }
-  if (more > 0) (down.empty() ? up : down) += " and " + std::to_string(more) + " more";
-  const std::string effect = i >= rank_
-                                 ? " changes no tracked feature."
-                                 : " by 10 % changes all tracked features together by only " +
-                                       format("%.2g", 0.1 / deviation_along(i)) + " standard deviations.";
-  if (mentioned == 1) return up + " is not determined: changing it" + effect;
-  if (down.empty()) return up + " go together: raising all of them" + effect;
-  return up + " trade off against " + down + ": raising the former while lowering the latter" + effect;
+  std::vector<std::string> names;
+  for (const FitVariable& variable : variables_) names.push_back(variable.name);
+  return adjoint::direction_in_words(right_vectors_.col(i), names) +
+         (i >= rank_ ? " changes no tracked feature."
+                     : " by 10 % changes all tracked features together by only " +
+                           format("%.2g", 0.1 / deviation_along(i)) + " standard deviations.");
 }
 
 std::vector<std::string> Identifiability::cannot_tell() const {
