@@ -63,14 +63,7 @@ void check(const LocatedJson& located) {
     const std::string at = "/variants/" + std::to_string(i) + "/name";
     if (!seen.insert(name).second)
       refuse(at, shown_json(name) + " a second time", "a name of its own for each");
-    // It becomes the name of a folder beside the tables.
-    if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+.") !=
-            std::string::npos ||
-        name.front() == '.')
-      refuse(at, shown_json(name), "letters, digits, _ - + and dots");
-    const auto& files = sweep_files();
-    if (std::find(files.begin(), files.end(), name) != files.end())
-      refuse(at, shown_json(name) + ", which is a file of the sweep", "another name");
+    check_variant_name(name, located.where(at) + ": " + at);
   }
   const json& measure = root["measure"];
   if (measure.contains("wavelengths") && measure["wavelengths"][0] >= measure["wavelengths"][1])
@@ -209,6 +202,29 @@ An experiment is JSON with comments: a scene, the variants of it that `rhytid st
 their wrinkles are measured. Settings are those of `--set`; later ones win: of the experiment, of the size, of the
 variant, of the variant at the size, of the command line. `rhytid schema` describes scenes.
 )");
+}
+
+void check_variant_name(const std::string& name, const std::string& where) {
+  // It becomes the name of a folder beside the tables.
+  if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+.") !=
+          std::string::npos ||
+      name.empty() || name.front() == '.')
+    throw InputError(where, shown_json(name), "letters, digits, _ - + and dots");
+  const auto& files = sweep_files();
+  if (std::find(files.begin(), files.end(), name) != files.end())
+    throw InputError(where, shown_json(name) + ", which is a file of the sweep", "another name");
+}
+
+bool is_experiment(const std::string& path) {
+  return read_with_extends(path, rule_tree(), "scene or experiment").json.contains("variants");
+}
+
+std::string variant_names(const Experiment& experiment) {
+  constexpr std::size_t most = 20;  // of a grid
+  std::string text;
+  for (std::size_t i = 0; i < std::min(experiment.variants.size(), most); ++i)
+    text += (text.empty() ? "" : ", ") + experiment.variants[i].name;
+  return text + (experiment.variants.size() > most ? ", ..." : "");
 }
 
 Experiment load_experiment(const std::string& path, StudySize size) {

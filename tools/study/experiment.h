@@ -25,9 +25,15 @@ struct WrinkleMeasure {
   double window_spacing = 0.5;  ///< mm
 };
 
+/// A value that a sweep sets, as it was written.
+struct SweptValue {
+  std::string address, text;
+};
+
 struct Variant {
   std::string name;
   std::vector<Setting> settings;  ///< of the experiment, its size, the variant and its size, in this order
+  std::vector<SweptValue> values = {};  ///< of a grid or a table; the last of the settings
 };
 
 struct Experiment {
@@ -45,6 +51,16 @@ const std::vector<Rule>& experiment_rules();
 /// JSON Schema and Markdown of the format, for `rhytid schema experiment`.
 nlohmann::json experiment_schema();
 std::string experiment_documentation();
+
+/// Whether the file has a list of variants, as scenes and cases have not. Throws InputError when it cannot be
+/// read.
+bool is_experiment(const std::string& path);
+
+/// Throws InputError naming `where` unless the name of a variant can be that of a folder beside the tables.
+void check_variant_name(const std::string& name, const std::string& where);
+
+/// "soft, firm".
+std::string variant_names(const Experiment& experiment);
 
 /// Reads an experiment at a size. Throws InputError of one line.
 Experiment load_experiment(const std::string& path, StudySize size);

@@ -7,14 +7,12 @@
 #include <map>
 #include <ostream>
 
-#include "sim/core/digest.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
-#include "sim/time/model_digest.h"
-#include "sim/time/program_digest.h"
 #include "tools/forward_run.h"
+#include "tools/study/study_run.h"
 #include "tools/study/sweep_report.h"
 #include "tools/study/variant_result.h"
 #include "tools/study/wrinkle_recorder.h"
@@ -45,7 +43,7 @@ class Sweep {
     for (const std::string& name : options_.only)
       if (std::none_of(experiment_.variants.begin(), experiment_.variants.end(),
                        [&](const Variant& v) { return v.name == name; }))
-        throw InputError("--only", "'" + name + "'", "one of " + names());
+        throw InputError("--only", "'" + name + "'", "one of " + variant_names(experiment_));
     // All models are built first: what is wrong with the last shows before the first runs.
     for (const Variant& v : experiment_.variants)
       if (is_wanted(v)) identities_[v.name] = identity_of(v);
@@ -68,13 +66,9 @@ class Sweep {
 
  private:
   bool is_wanted(const Variant& v) const {
+    if (!options_.shard.takes(static_cast<std::size_t>(&v - experiment_.variants.data()))) return false;
     return options_.only.empty() ||
            std::find(options_.only.begin(), options_.only.end(), v.name) != options_.only.end();
-  }
-  std::string names() const {
-    std::string text;
-    for (const Variant& v : experiment_.variants) text += (text.empty() ? "" : ", ") + v.name;
-    return text;
   }
   std::string folder_of(const Variant& v) const { return folder_ + "/" + v.name; }
   /// The command line has the last word.
@@ -89,12 +83,7 @@ class Sweep {
     try {
       const SceneModel built(load_scene(experiment_.scene, settings_of(v)));
       place_samples(built.model().mesh, experiment_.measure);
-      nlohmann::json scene = scene_to_json(built.scene());
-      scene.erase("description");
-      Digest of_scene, of_measure;
-      of_scene.text(scene.dump());
-      of_measure.text(experiment_.measure_json.dump());
-      return {of_scene.hex(), of_measure.hex(), content_digest(built.model()), program_digest()};
+      return study_identity(built.scene(), built.model(), experiment_.measure_json.dump());
     } catch (const InputError& error) {
       const std::string text = error.what();  // a setting's place begins with the experiment
       throw InputError(text.starts_with(experiment_.file + ":")

@@ -9,6 +9,7 @@
 
 #include "tools/frame_writer.h"
 #include "tools/study/experiment.h"
+#include "tools/study/study_run.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -16,7 +17,8 @@ namespace rhytid::tools {
 struct SweepOptions {
   std::vector<std::string> only;  ///< names of variants; empty = all
   bool anew = false;              ///< runs them from the beginning, whatever is there
-  FrameOptions frames;
+  FrameOptions frames = {};
+  Shard shard = {};  ///< of the variants
 };
 
 /// Builds the models of all variants asked for, then runs what is not finished and writes results.csv,

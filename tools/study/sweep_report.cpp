@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "sim/core/parse_number.h"
 #include "sim/output/atomic_file.h"
 #include "sim/output/csv.h"
 #include "sim/output/image.h"
@@ -15,6 +16,9 @@ namespace rhytid::tools {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Of a large grid so many runs have lines in the plots and pictures on the page.
+constexpr std::size_t kMostShown = 21;
 
 /// The columns of all results, in the order of their first appearance; without values.
 std::vector<ResultColumn> all_columns(const std::vector<VariantResult>& results) {
@@ -47,13 +51,38 @@ std::string heading(const ResultColumn& c) {
   return c.unit.empty() ? text : text + " [" + c.unit + "]";
 }
 
-void write_csv(const std::string& path, const std::vector<ResultColumn>& columns,
-               const std::vector<VariantResult>& results) {
+/// The addresses that a grid or a table sets; none in other sweeps.
+std::vector<std::string> swept_addresses(const Experiment& experiment) {
+  std::vector<std::string> addresses;
+  for (const SweptValue& value : experiment.variants.front().values) addresses.push_back(value.address);
+  return addresses;
+}
+
+/// What the sweep set in a variant, as it was written.
+std::vector<std::string> swept_values(const Experiment& experiment, const std::string& variant) {
+  std::vector<std::string> values;
+  for (const Variant& v : experiment.variants)
+    if (v.name == variant)
+      for (const SweptValue& value : v.values) values.push_back(value.text);
+  return values;
+}
+
+/// A number without quotes, anything else as text.
+CsvCell cell_of(const std::string& text) {
+  double number = 0;
+  if (parse(text, number)) return number;
+  return text;
+}
+
+void write_csv(const std::string& path, const Experiment& experiment,
+               const std::vector<ResultColumn>& columns, const std::vector<VariantResult>& results) {
   std::vector<CsvColumn> header = {{"variant", ""}, {"status", ""}};
+  for (const std::string& address : swept_addresses(experiment)) header.push_back({address, ""});
   for (const ResultColumn& c : columns) header.push_back({c.name, c.unit});
   CsvTable table(header);
   for (const VariantResult& r : results) {
     std::vector<CsvCell> row = {r.name, r.status};
+    for (const std::string& text : swept_values(experiment, r.name)) row.push_back(cell_of(text));
     for (const ResultColumn& c : columns) {
       const auto value = value_of(r, c.name);
       if (value)
@@ -66,37 +95,60 @@ void write_csv(const std::string& path, const std::vector<ResultColumn>& columns
   table.write(path);
 }
 
-/// Variants are columns: there are few of them and many numbers.
+/// The table of the page and of results.md, header first. A few variants are columns, of the many numbers;
+/// the many runs of a grid are rows.
+std::vector<std::vector<std::string>> cells(const Experiment& experiment,
+                                            const std::vector<ResultColumn>& columns,
+                                            const std::vector<VariantResult>& results) {
+  const std::vector<std::string> addresses = swept_addresses(experiment);
+  std::vector<std::vector<std::string>> rows = {{"variant", "status"}};
+  rows[0].insert(rows[0].end(), addresses.begin(), addresses.end());
+  for (const ResultColumn& c : columns) rows[0].push_back(heading(c));
+  for (const VariantResult& r : results) {
+    std::vector<std::string> row = {r.name, r.status};
+    const std::vector<std::string> values = swept_values(experiment, r.name);
+    row.insert(row.end(), values.begin(), values.end());
+    for (const ResultColumn& c : columns) row.push_back(rounded(value_of(r, c.name)));
+    rows.push_back(std::move(row));
+  }
+  if (!addresses.empty()) return rows;
+  std::vector<std::vector<std::string>> turned(rows[0].size());
+  for (std::size_t k = 0; k < turned.size(); ++k)
+    for (const auto& row : rows) turned[k].push_back(row[k]);
+  return turned;
+}
+
 std::string markdown(const Experiment& experiment, const std::vector<ResultColumn>& columns,
                      const std::vector<VariantResult>& results, const std::string& left_out) {
   std::string text = "# " + experiment.name + "\n\n" + experiment.description + "\n\n";
   if (!left_out.empty()) text += left_out + "\n\n";
-  text += "|  |";
-  for (const VariantResult& r : results) text += " " + r.name + " |";
-  text += "\n| --- |";
-  for (std::size_t i = 0; i < results.size(); ++i) text += " ---: |";
-  text += "\n| status |";
-  for (const VariantResult& r : results) text += " " + r.status + " |";
-  for (const ResultColumn& c : columns) {
-    text += "\n| " + heading(c) + " |";
-    for (const VariantResult& r : results) text += " " + rounded(value_of(r, c.name)) + " |";
+  bool is_header = true;
+  for (const auto& row : cells(experiment, columns, results)) {
+    text += "|";
+    for (std::size_t k = 0; k < row.size(); ++k)
+      text += " " + (is_header && k == 0 ? std::string() : row[k]) + " |";
+    text += "\n";
+    if (is_header) {
+      text += "| --- |";
+      for (std::size_t k = 1; k < row.size(); ++k) text += " ---: |";
+      text += "\n";
+    }
+    is_header = false;
   }
-  return text + "\n";
+  return text;
 }
 
-HtmlTable html_table(const std::vector<ResultColumn>& columns, const std::vector<VariantResult>& results) {
+HtmlTable html_table(const Experiment& experiment, const std::vector<ResultColumn>& columns,
+                     const std::vector<VariantResult>& results) {
   HtmlTable table;
-  table.header = {"variant"};
   table.caption = "What was measured, at the last frame";
   table.wide = true;
-  for (const VariantResult& r : results) table.header.push_back(r.name);
-  std::vector<TableCell> status = {"status"};
-  for (const VariantResult& r : results) status.emplace_back(r.status);
-  table.rows.push_back(std::move(status));
-  for (const ResultColumn& c : columns) {
-    std::vector<TableCell> row = {heading(c)};
-    for (const VariantResult& r : results) row.emplace_back(rounded(value_of(r, c.name)));
-    table.rows.push_back(std::move(row));
+  for (const auto& row : cells(experiment, columns, results)) {
+    if (table.header.empty()) {
+      table.header = row;
+      continue;
+    }
+    table.rows.emplace_back(row.begin(), row.end());
   }
   return table;
 }
@@ -116,6 +168,7 @@ std::vector<PlotSeries> series(const std::string& folder, const std::vector<Vari
       if (header == y) one.y = values;
     }
     if (!one.x.empty() && one.x.size() == one.y.size()) all.push_back(std::move(one));
+    if (all.size() == kMostShown) break;
   }
   return all;
 }
@@ -174,13 +227,13 @@ const std::vector<std::string>& sweep_files() {
 void write_sweep_report(const std::string& folder, const Experiment& experiment,
                         const std::vector<VariantResult>& results, const std::string& left_out) {
   const std::vector<ResultColumn> columns = all_columns(results);
-  write_csv(folder + "/results.csv", columns, results);
+  write_csv(folder + "/results.csv", experiment, columns, results);
   write_file(folder + "/results.md", markdown(experiment, columns, results, left_out));
 
   HtmlPage page(experiment.name, experiment.description);
   page.section("results", "Results");
   if (!left_out.empty()) page.paragraph(left_out);
-  page.table(html_table(columns, results));
+  page.table(html_table(experiment, columns, results));
   page.section("profiles", "Profiles");
   add_plot(page, folder, "profiles.svg",
            line_plot("Heights along the line, band-passed, at the last frame", "place [mm]", "height [mm]",
@@ -192,7 +245,11 @@ void write_sweep_report(const std::string& folder, const Experiment& experiment,
            line_plot("Crests along the line over time", "time [s]", "crests",
                      series(folder, results, "wrinkles.csv", "time_s", "line_crests")));
   page.section("pictures", "Pictures");
-  for (const VariantResult& r : results) add_pictures(page, folder, r);
+  for (std::size_t i = 0; i < std::min(results.size(), kMostShown); ++i)
+    add_pictures(page, folder, results[i]);
+  if (results.size() > kMostShown)
+    page.note("Plots and pictures show the first " + std::to_string(kMostShown) + " of " +
+              std::to_string(results.size()) + " runs; those of the others are in their folders.");
   write_file(folder + "/index.html", page.finish());
 }
 

@@ -1,14 +1,12 @@
 #include "tools/study/wrinkle_recorder.h"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/output/picture.h"
 #include "sim/output/text.h"
+#include "tools/study/study_run.h"
 
 namespace rhytid::tools {
 namespace {
@@ -33,34 +31,6 @@ std::vector<CsvColumn> columns(const WrinkleMeasure& measure) {
     list.push_back({"window_coherence", ""});
   }
   return list;
-}
-
-/// The surface seen along its mean normal, the longer side across the picture.
-PictureOptions from_above(const SubdividedSurface& outer) {
-  PictureOptions options;
-  const Vec3 normal = outer.smooth_normals({}).colwise().sum().transpose().normalized();
-  // Picture-up: y for skins that face z, else z; heads stand along y.
-  const Vec3 up = std::abs(normal[1]) < 0.9 ? Vec3::UnitY() : Vec3::UnitZ();
-  options.view_direction = -normal;
-  options.up = up - up.dot(normal) * normal;
-  options.width = 1000;
-  const MatrixX3 x = outer.positions({});
-  const Vec3 right = options.up->cross(normal).normalized();
-  const auto extent = [&x](const Vec3& axis) {
-    const VectorXd along = x * axis;
-    return along.maxCoeff() - along.minCoeff();
-  };
-  const double ratio = extent(options.up->normalized()) / extent(right);
-  options.height = std::clamp(static_cast<int>(1000 * ratio * 0.85) + 60, 320, 900);
-  options.samples = 2;
-  const Vec3 low = x.colwise().minCoeff().transpose(), high = x.colwise().maxCoeff().transpose();
-  PinholeCamera camera =
-      frame_box(low, high, *options.view_direction, *options.up, options.width, options.height);
-  // Room for the colour bar on the right.
-  camera.K.topLeftCorner<2, 2>() *= 0.88;
-  camera.K(0, 2) -= 0.05 * camera.width;
-  options.camera = camera;
-  return options;
 }
 
 }  // namespace
@@ -150,7 +120,7 @@ void WrinkleRecorder::frame(int frame, const State& state) {
 
 void WrinkleRecorder::draw(const State& state) const {
   const SubdividedSurface outer(scene_model_->model().mesh, SurfaceSide::outer, kSubdivision);
-  PictureOptions options = from_above(outer);
+  PictureOptions options = skin_from_above(outer);
   options.title = scene_model_->scene().name + ", frame " + std::to_string(scene_model_->scene().time.frames);
   PictureField field;
   field.values = outer.normal_displacement(state.u);
@@ -161,13 +131,8 @@ void WrinkleRecorder::draw(const State& state) const {
 }
 
 void WrinkleRecorder::draw_ligaments() const {
-  const SubdividedSurface outer(scene_model_->model().mesh, SurfaceSide::outer, kSubdivision);
-  PictureOptions options = from_above(outer);
-  options.title = scene_model_->scene().name;
-  PictureField field;
-  field.values = outer.interpolate(scene_model_->ligament_map(scene_model_->scene()));
-  field.label = "ligament b [1/mm]";
-  write_png(folder_ + "/ligaments.png", draw_surface(outer, {}, options, &field));
+  draw_on_skin(*scene_model_, scene_model_->ligament_map(scene_model_->scene()), "ligament b [1/mm]",
+               scene_model_->scene().name, folder_ + "/ligaments.png");
 }
 
 }  // namespace rhytid::tools

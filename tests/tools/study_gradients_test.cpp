@@ -1,0 +1,178 @@
+// Sensitivity and plan of a tiny scene through the verb, and the judgement of responses that are known.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "sim/scene/load.h"
+#include "sim/scene/scene_model.h"
+#include "tests/tools/study_call.h"
+#include "tools/study/sensitivity.h"
+
+namespace rhytid::tools {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+ParameterSpec named(const std::string& address, const std::string& name, double value) {
+  return {.address = address,
+          .name = name,
+          .unit = "",
+          .dimension = {},
+          .lower = 0,
+          .upper = 1,
+          .transform = ParameterTransform::log,
+          .value = value};
+}
+
+TEST(SensitivityJudgement, OfAKnownResponse) {
+  Sensitivity s;
+  s.parameters = {named("/skin/layers/a/youngs_modulus", "a", 2),
+                  named("/skin/layers/b/youngs_modulus", "b", 1), named("/c", "c", 1)};
+  // Positions feel ln a − ln b with 3 mm and ln c with 0.02 mm; a and b together are the gauge.
+  s.response.root = MatrixXd::Zero(3, 3);
+  s.response.root(0, 0) = 3, s.response.root(0, 1) = -3, s.response.root(2, 2) = 0.02;
+  SensitivityOptions options;
+  options.noise = 0.1, options.tracks = 4;
+  judge(s, options, VectorXd(Vec3(1, 1, 0)));
+  EXPECT_TRUE(s.has_gauge);
+  EXPECT_EQ(s.directions.rank, 2);
+  EXPECT_NEAR(s.directions.singular_values[0], 20 * 3 * std::sqrt(2), 1e-10);
+  EXPECT_TRUE(std::isinf(s.deviations[0]) && std::isinf(s.deviations[1]));
+  EXPECT_NEAR(s.deviations[2], 1 / (20 * 0.02), 1e-12);
+  EXPECT_EQ(s.held, 1);  // the softer of the layers
+  EXPECT_NEAR(s.held_deviations[0], 1 / 60., 1e-12);
+  EXPECT_EQ(s.held_deviations[1], 0);
+  EXPECT_NEAR(s.correlation(0, 2), 0, 1e-12);
+  EXPECT_TRUE(std::isnan(s.correlation(0, 1)));
+  ASSERT_EQ(s.sentences.size(), 2u);
+  EXPECT_THAT(s.sentences[0], HasSubstr("All stiffnesses together"));
+  EXPECT_THAT(s.sentences[1],
+              HasSubstr("c is not determined: changing it by 10 % changes all tracks together by 0.04"));
+  // Without the gauge the same null vector goes by its names.
+  judge(s, options, std::nullopt);
+  EXPECT_EQ(s.held, -1);
+  EXPECT_THAT(s.sentences[0], HasSubstr("a, b go together: raising all of them moves nothing."));
+}
+
+TEST(Sensitivity, OfASceneThroughTheVerb) {
+  const StudyPlace place("sensitivity");
+  const StudyCall call = place.call("sensitivity", "scene.json");
+  ASSERT_EQ(call.code, 0) << call.err;
+  EXPECT_THAT(call.out, HasSubstr("All stiffnesses together"));
+  for (const char* file :
+       {"parameters.csv", "frames.csv", "singular_values.csv", "correlation.csv", "map.csv", "map.png",
+        "map.vtp", "map.ply", "rms.svg", "sensitivity.txt", "index.html"})
+    EXPECT_TRUE(place.has(std::string("out/") + file)) << file;
+  const auto json = nlohmann::json::parse(place.text("out/sensitivity.json"));
+  EXPECT_TRUE(json["gauge"]);
+  EXPECT_EQ(json["held"], "/skin/layers/soft/youngs_modulus");
+  EXPECT_LT(json["rank"], json["parameters"].size());
+  EXPECT_EQ(place.text("out/sensitivity.txt") + "written to " + place.at("out") +
+                ": index.html, parameters.csv and more\n",
+            call.out);
+
+  // The map adds up to the derivative by a factor on all b, which differences of runs tell.
+  const std::string path = place.at("out/map.csv");
+  std::istringstream lines(place.text("out/map.csv"));
+  std::string line;
+  std::getline(lines, line);
+  double by_log_b = 0;
+  for (; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    std::vector<double> row;
+    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(std::stod(cell));
+    by_log_b += row[4] * row[6];
+  }
+  const auto figure_at = [&](double factor) {
+    const StudyPlace other("sensitivity_other");
+    const std::string left = std::to_string(0.5 * factor), right = std::to_string(3 * factor);
+    const StudyCall run = other.call(
+        "sensitivity", "scene.json",
+        {"--parameter", "/ligaments/stiffness", "--set", "/ligaments/sources/left/strength=" + left, "--set",
+         "/ligaments/sources/right/strength=" + right});
+    EXPECT_EQ(run.code, 0) << run.err;
+    return nlohmann::json::parse(other.text("out/sensitivity.json"))["figure"]["mm2"].get<double>();
+  };
+  const double difference = (figure_at(1.02) - figure_at(0.98)) / std::log(1.02 / 0.98);
+  EXPECT_NEAR(by_log_b, difference, 0.01 * std::abs(difference));
+  EXPECT_LT(by_log_b, 0);  // stiffer ligaments hold the skin
+}
+
+TEST(Sensitivity, RefusesInOneLine) {
+  const StudyPlace place("sensitivity_refused");
+  const auto error_of = [&](const std::vector<std::string>& more) {
+    const StudyCall call = place.call("sensitivity", "scene.json", more);
+    EXPECT_EQ(call.code, 2) << call.err;
+    EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
+    EXPECT_FALSE(place.has("out"));
+    return call.err;
+  };
+  EXPECT_THAT(error_of({"--parameter", "/base/stifness"}), HasSubstr("/base/stiffness"));
+  EXPECT_THAT(error_of({"--parameter", "/base/stiffness", "--parameter", "/base/stiffness"}),
+              HasSubstr("a second time"));
+  EXPECT_THAT(error_of({"--parameter", "/base/stiffness", "--hold", "/ligaments/stiffness"}),
+              HasSubstr("--hold"));
+  EXPECT_THAT(error_of({"--noise", "0"}), HasSubstr("--noise"));
+  EXPECT_THAT(error_of({"--view", "0", "0", "0"}), HasSubstr("--view"));
+  EXPECT_THAT(error_of({"--set", "/time/frames=0"}), HasSubstr("frames"));
+}
+
+std::string swipes(const std::string& more = "") {
+  return R"({"name": "swipes", "scene": "scene.json", "settings": ["/skin/surface/grid/cells=[4,3]"], "variants": [
+    {"name": "along", "settings": []},
+    {"name": "across", "settings": ["/colliders/finger/path/2/position=[-2, 8, 4.5]"]})" +
+         more + "]}";
+}
+
+const std::vector<std::string> kUnknowns = {"--parameter", "/ligaments/sources/left/strength", "--parameter",
+                                            "/ligaments/sources/right/strength"};
+
+TEST(PlanStudy, RanksSwipesAndKeepsThem) {
+  const StudyPlace place("plan");
+  write_file(place.at("swipes.json"), swipes());
+  const StudyCall call = place.call("plan", "swipes.json", kUnknowns);
+  ASSERT_EQ(call.code, 0) << call.err;
+  for (const char* file : {"swipes.csv", "pairs.csv", "order.csv", "posterior.svg", "plan.txt", "index.html",
+                           "along/variant.json"})
+    EXPECT_TRUE(place.has(std::string("out/") + file)) << file;
+  EXPECT_THAT(call.out, HasSubstr("film next"));
+  EXPECT_THAT(place.text("out/pairs.csv"), HasSubstr("D,along,across,"));
+  // Less noise, the same runs: deviations fall in every swipe.
+  auto sharper = kUnknowns;
+  sharper.insert(sharper.end(), {"--noise", "0.001", "--prior-of", "/ligaments/sources/left/strength=0.5"});
+  const std::string before = place.text("out/swipes.csv");
+  const StudyCall again = place.call("plan", "swipes.json", sharper);
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_THAT(again.err, HasSubstr("along: complete before, kept"));
+  EXPECT_THAT(again.err, Not(HasSubstr("runs")));
+  EXPECT_NE(place.text("out/swipes.csv"), before);
+  auto filmed = kUnknowns;
+  filmed.insert(filmed.end(), {"--filmed", "along"});
+  const StudyCall next = place.call("plan", "swipes.json", filmed);
+  EXPECT_THAT(next.out, HasSubstr("film next across ("));
+}
+
+TEST(PlanStudy, RefusesInOneLine) {
+  const StudyPlace place("plan_refused");
+  const auto error_of = [&](const std::string& experiment, const std::vector<std::string>& more) {
+    write_file(place.at("swipes.json"), experiment);
+    const StudyCall call = place.call("plan", "swipes.json", more);
+    EXPECT_EQ(call.code, 2) << call.err;
+    EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
+    EXPECT_FALSE(place.has("out"));
+    return call.err;
+  };
+  EXPECT_THAT(error_of(swipes(), {"--filmed", "alng"}),
+              HasSubstr("--filmed: got 'alng', expected one of along, across"));
+  EXPECT_THAT(error_of(swipes(), {"--prior-of", "/base/stiffness"}), HasSubstr("--prior-of"));
+  EXPECT_THAT(error_of(swipes(), {"--prior", "-1"}), HasSubstr("--prior"));
+  EXPECT_THAT(error_of(swipes(R"(, {"name": "firm", "settings": ["/base/stiffness=0.3"]})"),
+                       {"--parameter", "/base/stiffness"}),
+              HasSubstr("variant firm: /base/stiffness: got 0.3, expected 0.1, as in the other swipes"));
+}
+
+}  // namespace
+}  // namespace rhytid::tools

@@ -1,0 +1,66 @@
+// Sweeps over a grid and a table, through the verb.
+#include <gmock/gmock.h>
+
+#include "tests/tools/study_call.h"
+
+namespace rhytid::tools {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const std::vector<std::string> kQuiet = {"--set", "/output/pictures=false", "--set", "/output/vtu=false"};
+
+std::vector<std::string> quiet(const std::vector<std::string>& more) {
+  std::vector<std::string> list = kQuiet;
+  list.insert(list.end(), more.begin(), more.end());
+  return list;
+}
+
+TEST(SweptGrid, OfASceneRunsInShardsAndKeepsWhatIsFinished) {
+  const StudyPlace place("swept_grid");
+  const std::vector<std::string> grid = quiet(
+      {"--grid", "/skin/layers/soft/youngs_modulus=20 kPa,40 kPa", "--grid", "/ligaments/stiffness=0.0005"});
+  auto part = grid;
+  part.insert(part.end(), {"--shard", "2/2"});
+  const StudyCall second = place.call("sweep", "scene.json", part);
+  ASSERT_EQ(second.code, 0) << second.err;
+  EXPECT_THAT(second.out, HasSubstr("Left out: 0001 (not finished)."));
+  const StudyCall all = place.call("sweep", "scene.json", grid);
+  ASSERT_EQ(all.code, 0) << all.err;
+  EXPECT_THAT(all.err, HasSubstr("0002: complete before, kept"));
+  EXPECT_THAT(all.err, HasSubstr("0001: starts"));
+  const std::string csv = place.text("out/results.csv");
+  EXPECT_THAT(csv, HasSubstr("variant,status,/skin/layers/soft/youngs_modulus,/ligaments/stiffness,faces,"));
+  EXPECT_THAT(csv, HasSubstr("\n0001,complete,20 kPa,"));
+  EXPECT_THAT(csv, HasSubstr("\n0002,complete,40 kPa,"));
+  EXPECT_THAT(place.text("out/results.md"), HasSubstr("| 0002 | complete | 40 kPa | 0.0005 |"));
+}
+
+TEST(SweptGrid, OfATableTakesItsNames) {
+  const StudyPlace place("swept_table");
+  write_file(place.at("table.csv"), "name,/skin/layers/soft/youngs_modulus\nsoft,20 kPa\n");
+  const StudyCall call = place.call("sweep", "scene.json", quiet({"--csv", place.at("table.csv")}));
+  ASSERT_EQ(call.code, 0) << call.err;
+  EXPECT_TRUE(place.has("out/soft/steps.csv"));
+}
+
+TEST(SweptGrid, RefusesInOneLine) {
+  const StudyPlace place("swept_refused");
+  write_file(place.at("table.csv"), "/skin/ordr\n2\n");
+  const auto error_of = [&](const std::vector<std::string>& more) {
+    const StudyCall call = place.call("sweep", "scene.json", more);
+    EXPECT_EQ(call.code, 2) << call.err;
+    EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
+    EXPECT_FALSE(place.has("out"));
+    return call.err;
+  };
+  EXPECT_THAT(error_of({"--csv", place.at("table.csv")}), HasSubstr("table.csv:2: /skin/ordr: got"));
+  EXPECT_THAT(error_of({"--csv", place.at("none.csv")}), HasSubstr("none.csv"));
+  EXPECT_THAT(error_of({"--grid", "/skin/surface/grid/cells=1"}),
+              HasSubstr("--set: got /skin/surface/grid/cells"));
+  EXPECT_THAT(error_of({"--grid", "/skin/order=2,9"}), HasSubstr("0002"));
+}
+
+}  // namespace
+}  // namespace rhytid::tools

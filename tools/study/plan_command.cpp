@@ -1,0 +1,82 @@
+// rhytid study plan: which swipe to film next.
+#include <CLI/CLI.hpp>
+
+#include "sim/core/error.h"
+#include "tools/study/plan.h"
+#include "tools/study/study_command.h"
+
+namespace rhytid::tools {
+namespace {
+
+class PlanCommand final : public StudyCommand {
+ public:
+  StudyHelp help() const override {
+    return {
+        "plan",
+        "what planned swipes would tell, and which to film next",
+        "Takes the variants of an experiment for swipes of one face, runs each once and differentiates it. "
+        "From a stated noise and a prior follows the posterior of every swipe before there is footage: "
+        "deviations per parameter, D- and A-optimality, the best pairs and the order in which to film "
+        "(greedily, beside what is --filmed). Coordinates are logs (logits of fractions): a prior of 1 is a "
+        "factor e. To first order at the scene's values; skin that the finger hides counts as seen. Swipes "
+        "that were run are kept; noise, tracks and priors may change without running them again.",
+        "experiment.json and its scene; parameters have the same values in all its variants",
+        "plan.txt, swipes.csv, pairs.csv, order.csv, posterior.svg, index.html, a folder per swipe. Prints "
+        "the "
+        "text",
+        "rhytid study plan data/scenes/demo_swipes/experiment.json -o run/plan"};
+  }
+  bool is_of_experiments() const override { return true; }
+
+ protected:
+  std::string file_help() const override { return "experiment.json whose variants are swipes"; }
+  void add_options(CLI::App& app) override {
+    app.add_option("--only", options_.only, "plan with this swipe only; repeatable")
+        ->allow_extra_args(false)
+        ->option_text("NAME");
+    app.add_option("--filmed", options_.filmed, "this swipe has been filmed already; repeatable")
+        ->allow_extra_args(false)
+        ->option_text("NAME");
+    app.add_option(
+           "--parameter", options_.addresses,
+           "an unknown, as /ligaments/stiffness; repeatable (default: all with the same value in all swipes)")
+        ->allow_extra_args(false)
+        ->option_text("ADDRESS");
+    app.add_option("--noise", options_.noise, "of each component of a track in each frame, mm (default 0.1)")
+        ->check(CLI::PositiveNumber)
+        ->option_text("MM");
+    app.add_option("--tracks", options_.tracks, "tracks spread evenly over the surface (default 200)")
+        ->check(CLI::Range(1, 100000000))
+        ->option_text("N");
+    app.add_option("--view", view_, "direction of sight: motion along it is not seen (default: all is)")
+        ->expected(3)
+        ->option_text("X Y Z");
+    app.add_option("--prior", options_.prior, "standard deviation of every coordinate before (default 1)")
+        ->check(CLI::PositiveNumber)
+        ->option_text("SD");
+    app.add_option("--prior-of", options_.priors, "that of one parameter; repeatable")
+        ->allow_extra_args(false)
+        ->option_text("ADDRESS=SD");
+    app.add_flag("--anew", options_.anew, "run again what is finished");
+  }
+
+  ExitCode study(VerbContext& context) override {
+    if (!view_.empty()) {
+      options_.view = Vec3(view_[0], view_[1], view_[2]);
+      if (!(options_.view->norm() > 0)) throw InputError("--view", "0 0 0", "a direction");
+    }
+    return run_plan(context, load_experiment(context.options.file, size()), options_);
+  }
+
+ private:
+  PlanOptions options_;
+  std::vector<double> view_;
+};
+
+}  // namespace
+
+std::unique_ptr<StudyCommand> make_study_plan() {
+  return std::make_unique<PlanCommand>();
+}
+
+}  // namespace rhytid::tools

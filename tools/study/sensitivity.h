@@ -1,0 +1,55 @@
+// What the parameters of a scene do to its surface: one polished run, its tangent by all parameters in log or
+// logit coordinates, and the adjoint of one figure by the ligament parameter b of every node.
+// Tests: tests/tools/study_gradients_test.cpp
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "adjoint/directions.h"
+#include "adjoint/surface_response.h"
+#include "sim/scene/parameter.h"
+#include "tools/study/experiment.h"
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+
+struct SensitivityOptions {
+  StudySize size = StudySize::quick;
+  std::string variant;                 ///< of an experiment; empty = the first
+  std::vector<std::string> addresses;  ///< empty = all of the scene
+  double noise = 0.01;                 ///< mm, of each component of a track in each frame
+  int tracks = 200;                    ///< spread evenly over the outer surface
+  std::string hold;                    ///< address taken as known; empty = the modulus of the softest layer
+  std::optional<Vec3> view;            ///< what moves along it is not seen
+  bool map_all_frames = false;         ///< the map's figure is the mean over frames, not that of the last
+};
+
+/// The tables of a study, before they are written.
+struct Sensitivity {
+  std::vector<ParameterSpec> parameters;    ///< those with an effect
+  std::vector<std::string> without_effect;  ///< addresses
+  adjoint::SurfaceResponse response;        ///< by `parameters`
+  adjoint::Directions directions;           ///< of √tracks/noise · response.root
+  bool has_gauge = false;                   ///< "all stiffnesses together" leads the null vectors
+  VectorXd deviations;                      ///< of the coordinates, all free; infinite when open
+  int held = -1;                            ///< index into `parameters`; −1 = none
+  VectorXd held_deviations;                 ///< with it known (its own: 0)
+  MatrixXd correlation;                     ///< likewise; NaN for pairs that are open
+  std::vector<std::string> sentences;       ///< what positions cannot tell
+
+  double figure = 0;  ///< ⟨|u|²⟩ of the outer surface, mm², of the last frame or the mean over all
+  VectorXd b, dJ_db;  ///< [columns] 1/mm, mm³; empty without ligaments
+  VectorXd area;      ///< [columns] mm² of the inner surface
+  VectorXd share;     ///< [columns] b/J dJ/db per area, 1/cm²: % of the figure for 1 % of b on a cm²
+};
+
+/// Singular directions, deviations and sentences of a response, `gauge` being the coordinates of the gauge
+/// direction if there is one: fills all of `s` that follows from `s.response`.
+void judge(Sensitivity& s, const SensitivityOptions& options, const std::optional<VectorXd>& gauge);
+
+/// Runs the study and writes its files. Throws InputError.
+ExitCode run_sensitivity(VerbContext& context, const SensitivityOptions& options);
+
+}  // namespace rhytid::tools

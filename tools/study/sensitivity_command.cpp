@@ -1,0 +1,75 @@
+// rhytid study sensitivity: what the parameters of a scene do to its surface, from one run.
+#include <CLI/CLI.hpp>
+
+#include "sim/core/error.h"
+#include "tools/study/sensitivity.h"
+#include "tools/study/study_command.h"
+
+namespace rhytid::tools {
+namespace {
+
+class SensitivityCommand final : public StudyCommand {
+ public:
+  StudyHelp help() const override {
+    return {
+        "sensitivity",
+        "what each parameter does to the surface, and what positions cannot tell",
+        "Runs the scene once, converged for derivatives, and differentiates it by its parameters in log or "
+        "logit coordinates: how far a unit of each moves the outer surface; singular values of the Jacobian "
+        "and the directions that positions cannot tell, by name; predicted standard deviations and "
+        "correlations under a stated noise; and, by the adjoint, where on the face the ligament parameter "
+        "b matters. All to first order, at the scene's own values.",
+        "a scene, a case for its scene, or experiment.json for one of its variants",
+        "sensitivity.txt and .json; parameters.csv, frames.csv, singular_values.csv, correlation.csv, "
+        "map.csv; rms.svg; map.png, .vtp and .ply; response_NAME.png; index.html with all of it. Prints the "
+        "text",
+        "rhytid study sensitivity data/scenes/sheet_drag/scene.json -o run/sensitivity"};
+  }
+
+ protected:
+  std::string file_help() const override { return "a scene, a case, or experiment.json"; }
+  void add_options(CLI::App& app) override {
+    app.add_option("--parameter", options_.addresses,
+                   "differentiate by this address, as /ligaments/stiffness; repeatable (default: all)")
+        ->allow_extra_args(false)
+        ->option_text("ADDRESS");
+    app.add_option("--variant", options_.variant, "of an experiment (default: the first)")
+        ->option_text("NAME");
+    app.add_option("--noise", options_.noise, "of each component of a track in each frame, mm (default 0.01)")
+        ->check(CLI::PositiveNumber)
+        ->option_text("MM");
+    app.add_option("--tracks", options_.tracks, "tracks spread evenly over the surface (default 200)")
+        ->check(CLI::Range(1, 100000000))
+        ->option_text("N");
+    app.add_option("--hold", options_.hold,
+                   "parameter taken as known (default: the modulus of the softest layer, when scaling all "
+                   "stiffnesses together moves nothing)")
+        ->option_text("ADDRESS");
+    app.add_option("--view", view_, "direction of sight: motion along it is not seen (default: all is)")
+        ->expected(3)
+        ->option_text("X Y Z");
+    app.add_flag("--all-frames", options_.map_all_frames,
+                 "the map's figure is the mean over all frames, not that of the last");
+  }
+
+  ExitCode study(VerbContext& context) override {
+    options_.size = size();
+    if (!view_.empty()) {
+      options_.view = Vec3(view_[0], view_[1], view_[2]);
+      if (!(options_.view->norm() > 0)) throw InputError("--view", "0 0 0", "a direction");
+    }
+    return run_sensitivity(context, options_);
+  }
+
+ private:
+  SensitivityOptions options_;
+  std::vector<double> view_;
+};
+
+}  // namespace
+
+std::unique_ptr<StudyCommand> make_study_sensitivity() {
+  return std::make_unique<SensitivityCommand>();
+}
+
+}  // namespace rhytid::tools

@@ -1,0 +1,63 @@
+// What all studies share: the scene that they work on, shards of their runs, when a result is out of date,
+// and the polished run that derivatives are taken of.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/output/picture.h"
+#include "sim/scene/parameter.h"
+#include "sim/scene/scene_model.h"
+#include "tools/study/experiment.h"
+#include "tools/study/variant_result.h"
+#include "tools/verb.h"
+
+namespace rhytid::tools {
+
+/// Part `index` of `count` of a study's runs, for several machines: run i belongs to part 1 + i mod count.
+struct Shard {
+  int index = 1, count = 1;
+  bool takes(std::size_t run) const {
+    return run % static_cast<std::size_t>(count) + 1 == static_cast<std::size_t>(index);
+  }
+};
+
+/// "2/4" as a shard; empty text is the whole. Throws InputError otherwise.
+Shard parse_shard(const std::string& text);
+
+/// A scene, or one variant of an experiment with what it measures.
+struct StudyScene {
+  Scene scene;
+  WrinkleMeasure measure;    ///< of the experiment; a scene alone has no line and no window
+  std::string measure_text;  ///< what a result depends on
+};
+
+/// Loads FILE of a study: a scene, a case for its scene, or an experiment.json, of which the variant of that
+/// name is taken (empty: the first). The settings of the command line come last. Throws InputError.
+StudyScene load_study_scene(VerbContext& context, StudySize size, const std::string& variant);
+
+/// What a result of this scene depends on, the measure beside it.
+VariantIdentity study_identity(const Scene& scene, const Model& model, const std::string& measure);
+
+/// A run that can be differentiated (tight tolerance and a polish, states kept), with progress. Nothing when
+/// it was interrupted or did not reach its last frame; `code` then says which, and the reason is on stderr.
+std::optional<Trajectory> polished_run(const SceneModel& scene_model, Progress& progress, ExitCode& code);
+
+/// Names as addresses of `scene`, or all that the scene has when empty. Throws InputError for one that it has
+/// not, or that is given twice.
+std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vector<std::string>& addresses);
+
+/// A name for files: letters, digits and _ . - stay, the rest becomes _.
+std::string file_name(const std::string& text);
+
+/// Draws a scalar on the outer skin, seen from above: `values` per column. `solids_at` adds the colliders at
+/// that time as thin glass, and the ligament sources as black dots.
+void draw_on_skin(const SceneModel& scene_model, const VectorXd& values, const std::string& label,
+                  const std::string& title, const std::string& path, ColourMap map = ColourMap::sequential,
+                  std::optional<double> solids_at = std::nullopt);
+
+/// The surface seen along its mean normal, the longer side across the picture, with room for a colour bar.
+PictureOptions skin_from_above(const SubdividedSurface& outer);
+
+}  // namespace rhytid::tools
