@@ -59,6 +59,8 @@ Totals drag(std::vector<std::string> settings, int substeps) {
   return t;
 }
 
+// N is the remainder of each term, so that this sum closes whatever E, W and D are: it sees that the steps converged
+// and that terms and rim are summed. What E, W and D are worth is judged in energy_quadrature_test.cpp.
 TEST(EnergyBalance, WholeDragClosesToTheResidual) {
   std::printf("drag: work, stored at the end, viscous, friction, numerical [mJ], imbalance/work\n");
   for (const char* damper : {"exponential", "backward_euler"}) {

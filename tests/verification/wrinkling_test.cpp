@@ -81,14 +81,35 @@ TEST(Wrinkling, WhatTheReferenceSceneGives) {
   }
 }
 
+/// What a scheme must find: its strain and wavelength over the exact ones, and its own as computed apart from
+/// this project with exact waves along x (strain in %, wavelength in films; 0 where none was).
+struct Expected {
+  Scheme scheme;
+  double strain_ratio[2], wavelength_ratio[2];  // bonded, sliding
+  double strain_apart[2], wavelength_apart[2];
+};
+
+// Two judges. The polynomials of stack_bifurcation.h, to the bracket: a strip that misses them has wrong elements.
+// And the distance from the exact onset, as tests/verification/README.md prints it: it fails when either the
+// elements or the polynomials change, also together.
 TEST(Wrinkling, StripsOfElementsWrinkleAsTheirPolynomialsMust) {
-  const Scheme schemes[] = {{"composite 2", 2, 2, 1}, {"composite 3", 3, 2, 1}, {"composite 4", 4, 2, 1},
-                            {"stacked 2|2", 0, 2, 1}, {"stacked 3|2", 0, 3, 1}, {"stacked 2,2|2", 0, 2, 2}};
+  const Expected table[] = {
+      {{"composite 2", 2, 2, 1}, {5.385, 3.548}, {1.442, 3.067}, {8.94, 5.31}, {31.7, 80.1}},
+      {{"composite 3", 3, 2, 1}, {1.170, 1.711}, {1.198, 1.841}, {1.93, 0}, {26.3, 0}},
+      {{"composite 4", 4, 2, 1}, {1.134, 1.217}, {1.099, 1.243}, {1.87, 0}, {24.1, 0}},
+      {{"stacked 2|2", 0, 2, 1}, {1.263, 1.141}, {0.829, 0.966}, {2.08, 0}, {18.2, 0}},
+      {{"stacked 3|2", 0, 3, 1}, {1.010, 1.059}, {1.005, 1.015}, {0, 0}, {0, 0}},
+      {{"stacked 2,2|2", 0, 2, 2}, {1.028, 1.066}, {0.990, 1.010}, {1.70, 1.606}, {21.7, 26.35}}};
+  const double exact_strain[] = {0.01650, 0.01507}, exact_wavelength[] = {21.94, 26.09};
+  int base = 0;
   for (const Stack& stack : {Stack{10, 1, 200, false}, Stack{20, 1, 200, true}}) {
     const Onset exact = StackBifurcation(layers_of(stack), fine_elements(), stack.sliding).onset(15, 40);
+    EXPECT_NEAR(exact.strain, exact_strain[base], 1.5e-3 * exact_strain[base]);
+    EXPECT_NEAR(exact.wavelength, exact_wavelength[base], 2e-3 * exact_wavelength[base]);
     std::printf("film 1 on %g, 200:1, %s base: exact %.4f %%, %.2f\n", stack.soft,
                 stack.sliding ? "sliding" : "bonded", 100 * exact.strain, exact.wavelength);
-    for (const Scheme& scheme : schemes) {
+    for (const Expected& row : table) {
+      const Scheme& scheme = row.scheme;
       const StackBifurcation polynomials(layers_of(stack), elements_of(scheme), stack.sliding);
       const Onset own = polynomials.onset(15, 90);
       const double found = Strip(stack, scheme, own.wavelength).onset(own.strain);
@@ -96,6 +117,15 @@ TEST(Wrinkling, StripsOfElementsWrinkleAsTheirPolynomialsMust) {
                   scheme.name, 100 * found, 100 * (found / own.strain - 1), own.wavelength,
                   100 * (found / exact.strain - 1), 100 * (own.wavelength / exact.wavelength - 1));
       EXPECT_NEAR(found, own.strain, 5e-4 * own.strain) << scheme.name;
+      EXPECT_NEAR(found / exact.strain, row.strain_ratio[base], 2e-3 * row.strain_ratio[base]) << scheme.name;
+      EXPECT_NEAR(own.wavelength / exact.wavelength, row.wavelength_ratio[base],
+                  5e-3 * row.wavelength_ratio[base])
+          << scheme.name;
+      if (row.strain_apart[base] > 0) {
+        EXPECT_NEAR(100 * found, row.strain_apart[base], 0.01 * row.strain_apart[base]) << scheme.name;
+        EXPECT_NEAR(own.wavelength, row.wavelength_apart[base], 0.01 * row.wavelength_apart[base])
+            << scheme.name;
+      }
       // Shorter and longer waves come later, when theory says.
       for (const double ratio : {1 / 1.2, 1.2}) {
         const double later = polynomials.strain_at(ratio * own.wavelength, own.strain);
@@ -105,6 +135,7 @@ TEST(Wrinkling, StripsOfElementsWrinkleAsTheirPolynomialsMust) {
         EXPECT_FALSE(strip.stable((1 + 1e-3) * later)) << scheme.name << ' ' << ratio;
       }
     }
+    ++base;
   }
 }
 
