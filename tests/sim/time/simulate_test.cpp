@@ -91,6 +91,60 @@ TEST(Simulate, HardStepIsBisectedAndEndsInTheSameFrames) {
   EXPECT_EQ(static_cast<int>(failed.frame_end.back()), static_cast<int>(failed.steps.size()));
 }
 
+/// The first half of a frame is accepted, the second fails at full depth: what the run then says.
+TEST(Simulate, AFrameThatFailsHalfwayKeepsTheFramesBeforeIt) {
+  Scene s = small_drag(1, 3);
+  // Pressed in frame 1, held for half of frame 2, then 1.2 mm deeper at once.
+  s.colliders[0].path = {{0, Vec3(-2, 0, 5.02)},
+                         {1. / 24, Vec3(-2, 0, 4.9)},
+                         {1.5 / 24, Vec3(-2, 0, 4.9)},
+                         {1.5 / 24 + 1e-6, Vec3(-2, 0, 3.7)}};
+  const SceneModel m(s);
+  RunOptions options = m.run_options();
+  options.frames = 1;
+  const Trajectory first = run_scene(m, options);
+  ASSERT_TRUE(first.complete) << first.failure;
+  // As many iterations as the first frame takes: too few for the second half of the next, softened or not.
+  options.frames = 3;
+  options.minimiser.max_iterations = first.steps[0].report.iterations;
+  options.max_bisections = 1;
+  std::vector<double> seen;
+  int frames_seen = 0;
+  RunObserver observer;
+  observer.step = [&](const StepEvent& e) {
+    seen.push_back(e.state.time);
+    frames_seen += e.frame_done;
+  };
+  const Trajectory run = simulate(m.model(), m.native(), options, observer);
+  EXPECT_FALSE(run.complete);
+  for (const char* part : {"frame 2", "t = 0.08", "max_iterations", "1 bisections", "residual", "wanted"})
+    EXPECT_NE(run.failure.find(part), std::string::npos) << part << " in: " << run.failure;
+  EXPECT_EQ(run.frames(), 1);
+  ASSERT_EQ(run.frame_end, (std::vector<int>{0, 1}));
+  ASSERT_EQ(run.steps.size(), 2u) << "the first half is kept, beyond the last frame";
+  // The frames are untouched by what came after them; the half step stands behind them, on the true grid of times.
+  EXPECT_TRUE(same_bits(run.at_frame(1).u, first.at_frame(1).u));
+  EXPECT_TRUE(same_bits(run.at_frame(1).history, first.at_frame(1).history));
+  EXPECT_EQ(run.at_frame(1).time, 1. / 24);
+  EXPECT_EQ(run.steps[1].frame, 2);
+  EXPECT_EQ(run.steps[1].bisections, 1);
+  EXPECT_EQ(run.steps[1].step.t_old, 1. / 24);
+  EXPECT_DOUBLE_EQ(run.steps[1].state.time, 1.5 / 24);
+  EXPECT_TRUE(run.steps[1].state.u.allFinite());
+  // An observer (who writes frames and tables) has seen two steps and one frame.
+  EXPECT_EQ(seen, (std::vector<double>{1. / 24, run.steps[1].state.time}));
+  EXPECT_EQ(frames_seen, 1);
+  // From the last frame it goes on as a whole run would.
+  options.minimiser.max_iterations = 200;
+  options.max_bisections = 4;
+  const Trajectory whole = run_scene(m, options);
+  ASSERT_TRUE(whole.complete) << whole.failure;
+  options.frames_done = 1;
+  const Trajectory rest = simulate(m.model(), m.native(), options, {}, &run.at_frame(1));
+  ASSERT_TRUE(rest.complete) << rest.failure;
+  EXPECT_TRUE(same_bits(rest.at_frame(2).u, whole.at_frame(3).u));
+}
+
 TEST(Simulate, SubstepsEndInTheSameFrameTimesAndConverge) {
   Scene s = small_drag(1, 4);
   s.skin.surface.grid_cells = {3, 2};
