@@ -49,7 +49,7 @@ void add_materials(CaseList& list) {
              {"/skin/layers/film/youngs_modulus=" + text_of(0.02 * ratio)}, ratio == 1e4);
   for (int power = -6; power <= 6; power += 2) {
     const std::string tau = text_of(kFrameTime / std::pow(10., power));
-    for (const std::string damper : {"exponential", "literal", "strang"}) {
+    for (const std::string damper : {"exponential", "literal", "strang", "backward_euler", "none"}) {
       if (damper != "exponential" && std::abs(power) < 6) continue;
       list.add("dt / tau (" + damper + ")", text_of(std::pow(10., power)),
                {"/skin/layers/soft/relaxation_time=" + tau, "/skin/layers/film/relaxation_time=" + tau,
@@ -74,7 +74,12 @@ void add_ligaments(CaseList& list) {
            {"/ligaments/sources/left/strength=0", "/ligaments/sources/right/strength=0"}, true);
   list.sweep("ligament b, 1/mm", {1e-6, 1e-3, 1, 10, 100, 1e3, 1e4},
              {"/ligaments/sources/left/strength=", "/ligaments/sources/right/strength="}, {1e4});
-  list.sweep("ligament eps, mm", {1e-8, 1e-6, 1e-4, 1e-2, 1}, {"/ligaments/smoothing="}, {1e-6});
+  list.sweep("ligament eps, mm", {1e-8, 1e-6, 1e-4, 1e-2, 1}, {"/ligaments/smoothing="}, {1e-8, 1e-6});
+  for (const double b : {1e-6, 1., 1e4})
+    list.add("ligament b (fung_quadratic), 1/mm", text_of(b),
+             {"/ligaments/law=fung_quadratic", "/ligaments/sources/left/strength=" + text_of(b),
+              "/ligaments/sources/right/strength=" + text_of(b)},
+             b == 1e4);
   list.sweep("ligament stiffness, MPa", {1e-9, 1e-3, 1, 1e3}, {"/ligaments/stiffness="});
   list.sweep("diffusion time, mm^2", {1e-9, 1, 1e9}, {"/ligaments/diffusion_time="});
 }
@@ -86,11 +91,14 @@ void add_contact(CaseList& list) {
     if (one.sweep == "kappa, kPa/mm") {
       const std::string kappa = text_of(std::stod(one.value) / 1000);
       one.settings = {"/base/stiffness=" + kappa, "/colliders/finger/stiffness=" + kappa};
-      one.is_quick = one.value == "100000";
+      one.is_quick = one.value == "100000" || one.value == "1e+09";
     }
   list.sweep("onset eps_g, mm", {0, 1e-8, 1e-6, 1e-4, 1e-2, 1}, {"/base/onset=", "/colliders/finger/onset="},
              {1e-8});
   list.sweep("slip speed eps_v, mm/s", {1e-6, 1e-4, 1e-2, 1, 1e2}, {"/colliders/finger/friction/slip_speed="},
+             {1e-6});
+  list.sweep("slip speed (quadratic), mm/s", {1e-6, 1, 1e2},
+             {"/colliders/finger/friction/mollifier=quadratic", "/colliders/finger/friction/slip_speed="},
              {1e-6});
   list.sweep("friction coefficient", {0, 0.1, 1, 10}, {"/colliders/finger/friction/coefficient="});
   for (const double speed : {1., 10., 100., 1e3, 1e4, 1e6})
@@ -120,6 +128,92 @@ void add_shapes(CaseList& list) {
   }
   list.sweep("in-plane order p", {1, 2, 3, 4}, {"/skin/order="});
   list.add("composite", "q = 3", {"/skin/scheme=composite"});
+}
+
+/// The finger in another shape, with the path of the base scene, turned by up to `degrees` about `axis` on the way.
+std::vector<std::string> other_finger(const std::string& shape, const std::vector<std::string>& more,
+                                      double degrees = 0, const char* axis = "[0,0,1]") {
+  std::vector<std::string> settings = {"/colliders/finger/shape=" + shape};
+  settings.insert(settings.end(), more.begin(), more.end());
+  double direction[3];
+  std::sscanf(axis, "[%lf,%lf,%lf]", direction, direction + 1, direction + 2);
+  const auto knot = [&](double time, double x, double z, double part) {
+    std::string turn;
+    for (int a = 0; a < 3; ++a)
+      turn += (a ? "," : "") + text_of(direction[a] * part * degrees * std::acos(-1.) / 180);
+    return "{\"time\":" + text_of(time) + ",\"position\":[" + text_of(x) + ",0," + text_of(z) +
+           "],\"rotation\":[" + turn + "]}";
+  };
+  settings.push_back("/colliders/finger/path=[" + knot(0, -2, 5.02, 0) + "," +
+                     knot(2 * kFrameTime, -2, 4.6, 0.5) + "," + knot(4 * kFrameTime, -1.2, 4.6, 1) + "]");
+  return settings;
+}
+
+void add_fingers(CaseList& list) {
+  for (const double length : {0., 6., 1e3})
+    list.add("capsule, length mm", text_of(length),
+             other_finger("capsule",
+                          {"/colliders/finger/axis=[0,1,0]", "/colliders/finger/length=" + text_of(length)}),
+             length == 1e3);
+  for (const char* semi_axes : {"[8,3,5]", "[1e3,1e3,5]", "[0.05,0.05,5]"})
+    list.add("ellipsoid, semi-axes mm", semi_axes,
+             other_finger("ellipsoid", {std::string("/colliders/finger/semi_axes=") + semi_axes}), false,
+             semi_axes[1] == '0' ? CaseList::clear_outcome : CaseList::converges);
+  for (const double depth : {0.1, 0.4, 1.2})
+    list.add("plane pressed down, mm", text_of(depth),
+             {"/colliders/finger/shape=plane", "/colliders/finger/normal=[0,0,-1]",
+              "/colliders/finger/path=[{\"time\":0,\"position\":[0,0,0.02]},{\"time\":0.1666666666667,"
+              "\"position\":[0.5,0," +
+                  text_of(-depth) + "]}]"},
+             depth == 0.1, depth > 1 ? CaseList::clear_outcome : CaseList::converges);
+  for (const double degrees : {1e-9, 90., 330.}) {
+    list.add("turn of a sphere about x, deg", text_of(degrees),
+             other_finger("sphere", {}, degrees, "[1,0,0]"), degrees == 330);
+    list.add(
+        "turn of a capsule about z, deg", text_of(degrees),
+        other_finger("capsule", {"/colliders/finger/axis=[0,1,0]", "/colliders/finger/length=6"}, degrees));
+  }
+  list.add("turn of a sphere about x, deg", "180 between knots", other_finger("sphere", {}, 360, "[1,0,0]"),
+           true, CaseList::refused);
+  list.add("path", "spline", {"/colliders/finger/interpolation=spline"});
+  list.add("path", "clamped_spline", {"/colliders/finger/interpolation=clamped_spline"});
+}
+
+/// Tension at rest, held parts, and what else a scene may ask of its steps and rules.
+void add_features(CaseList& list) {
+  // Equal stretches in the plane and nothing else: every eigenvalue of the strain is at least double.
+  for (const double stretch : {1., 1.00000001, 1.3, 2., 2.5})
+    list.add(
+        "equibiaxial pre-stretch alone", text_of(stretch),
+        {"/skin/pre_stretch/stretch=" + text_of(stretch), "/colliders=[]", "/base=null", "/ligaments=null"},
+        stretch == 1.3, stretch > 1.5 ? CaseList::clear_outcome : CaseList::converges);
+  for (const double stretch : {0.4, 0.7, 0.95, 1.05, 1.3, 2.5})
+    list.add("pre-stretch", text_of(stretch), {"/skin/pre_stretch/stretch=" + text_of(stretch)},
+             stretch == 1.3, stretch < 0.9 || stretch > 1.5 ? CaseList::clear_outcome : CaseList::converges);
+  list.add("pre-stretch", "1.3 along x, 0.9 across",
+           {R"(/skin/pre_stretch={"stretch": 1.3, "across": 0.9, "direction": [1, 0, 0]})"});
+  for (const double shift : {0., 0.1, 1., 3., 10.})
+    list.add("held side moved, mm", text_of(shift),
+             {R"(/skin/held=[{"name": "side", "box": {"low": [-8, -6, 0], "high": [-8, 6, 0]},
+                "path": [{"time": 0, "displacement": [0, 0, 0]}, {"time": 0.1666666666667, "displacement": [)" +
+              text_of(-shift) + "," + text_of(0.5 * shift) + ",0]}]}]"},
+             shift == 1, shift > 1 ? CaseList::clear_outcome : CaseList::converges);
+  list.sweep("passes over the lag", {2, 12, 100}, {"/time/lag_passes="}, {2});
+  list.sweep("substeps", {2, 16}, {"/time/substeps="}, {2});
+  for (const char* nu : {"0.49", "0.4999"})
+    list.add("volume reduced, nu", nu,
+             {"/skin/quadrature/volume=reduced", std::string("/skin/layers/soft/poissons_ratio=") + nu,
+              std::string("/skin/layers/film/poissons_ratio=") + nu},
+             nu == std::string("0.4999"));
+  for (int p = 1; p <= 4; ++p)
+    list.add("sheet rule, p", text_of(p),
+             {"/skin/quadrature/rule=sheet", "/skin/order=" + text_of(p),
+              std::string("/skin/layers/soft/order=") + (p == 1 ? "1" : "2"),
+              std::string("/skin/layers/film/order=") + (p == 1 ? "1" : "2")},
+             p == 2, p == 1 ? CaseList::clear_outcome : CaseList::converges);
+  list.add("sheet rule, p", "2 under order 4 through the thickness",
+           {"/skin/quadrature/rule=sheet", "/skin/layers/soft/order=4"}, true, CaseList::refused);
+  list.add("IMLS kernel", "literal", {"/base/shape=imls", "/base/imls_kernel=literal"}, true);
 }
 
 void add_degenerate(CaseList& list) {
@@ -185,7 +279,7 @@ void add_corners(CaseList& list) {
          "/ligaments/sources/left/strength=" + b, "/ligaments/smoothing=" + eps, "/base/stiffness=" + kappa,
          "/colliders/finger/stiffness=" + kappa, "/base/onset=" + onset, "/colliders/finger/onset=" + onset,
          "/colliders/finger/friction/slip_speed=" + slip, "/skin/layers/film/thickness=" + thickness},
-        k == 1);
+        k % 4 == 1 || k == 6 || k == 12);
   }
 }
 
@@ -228,6 +322,8 @@ const std::vector<StabilityCase>& stability_cases() {
     add_ligaments(list);
     add_contact(list);
     add_shapes(list);
+    add_fingers(list);
+    add_features(list);
     add_degenerate(list);
     add_corners(list);
     return std::move(list.cases);

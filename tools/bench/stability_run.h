@@ -28,6 +28,11 @@ struct StabilityResult {
   bool as_demanded = false;
 };
 
+/// Whether a message tells its reader what happened. Refused: it names the key that was set and says "got ...,
+/// expected ...". Not converged: it names frame, time, status, iterations and the residual against what was
+/// wanted. Converged: nothing need be said. Otherwise false.
+bool is_clear(const StabilityCase& one, StabilityOutcome outcome, const std::string& message);
+
 /// What `check` warns of in a case and not in the base scene; empty when nothing. For cases that converged.
 std::string stability_warnings(const StabilityCase& one);
 
