@@ -44,7 +44,7 @@ Posterior posterior(const std::vector<MatrixXd>& roots, const std::vector<int>& 
   Posterior result;
   result.covariance = inverse * inverse.transpose();
   result.trace = result.covariance.trace();
-  result.log_det = -2 * root.diagonal().cwiseAbs().array().log().sum();
+  result.log_det = 0 - 2 * root.diagonal().cwiseAbs().array().log().sum();
   return result;
 }
 

@@ -17,7 +17,7 @@ namespace rhytid::tools {
 struct PlanOptions {
   std::vector<std::string> only;       ///< swipes; empty = all
   std::vector<std::string> addresses;  ///< empty = all that all swipes have, with the same value
-  double noise = 0.1;                  ///< mm, of each component of a track in each frame
+  double noise = 0.01;                 ///< mm, of each component of a track in each frame
   int tracks = 200;                    ///< spread evenly over the outer surface
   std::optional<Vec3> view;            ///< what moves along it is not seen
   double prior = 1;                    ///< standard deviation of every coordinate before any footage

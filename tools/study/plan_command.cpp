@@ -42,7 +42,7 @@ class PlanCommand final : public StudyCommand {
            "an unknown, as /ligaments/stiffness; repeatable (default: all with the same value in all swipes)")
         ->allow_extra_args(false)
         ->option_text("ADDRESS");
-    app.add_option("--noise", options_.noise, "of each component of a track in each frame, mm (default 0.1)")
+    app.add_option("--noise", options_.noise, "of each component of a track in each frame, mm (default 0.01)")
         ->check(CLI::PositiveNumber)
         ->option_text("MM");
     app.add_option("--tracks", options_.tracks, "tracks spread evenly over the surface (default 200)")

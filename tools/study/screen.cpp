@@ -35,7 +35,7 @@ class Measure {
     for (std::size_t k = 0; k < names.size(); ++k)
       if (names[k] != "base") columns.push_back({"force_" + names[k], "N", reading.contacts[k].force.norm()});
     const VectorXd& u = event.state.u;
-    columns.push_back({"mean_displacement", "mm", std::sqrt(mean_square_.values(1, event.state)[0])});
+    columns.push_back({"rms_displacement", "mm", std::sqrt(mean_square_.values(1, event.state)[0])});
     double largest = 0;
     for (int c = 0; c < model_.mesh.num_columns; ++c)
       largest = std::max(largest, u.segment<3>(3 * model_.mesh.node(c, model_.mesh.num_levels - 1)).norm());

@@ -25,9 +25,8 @@ struct ScreenOptions {
   bool anew = false;
 };
 
-/// What is measured of a run, at its last frame: force_NAME of every collider [N], mean_displacement (rms
-/// over the outer surface by area) and max_displacement [mm], amplitudes of wrinkles where an experiment
-/// says.
+/// What is measured of a run, at its last frame: force_NAME of every collider [N], rms_displacement
+/// (over the outer surface by area) and max_displacement [mm], amplitudes of wrinkles where an experiment says.
 struct ScreenResult {
   std::vector<ParameterRange> ranges;
   MatrixXd points;                         ///< [runs of the design][parameters], in [0, 1]

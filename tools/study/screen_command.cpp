@@ -14,7 +14,7 @@ class ScreenCommand final : public StudyCommand {
         "screen",
         "which parameters matter over their whole range (Morris, Sobol)",
         "Runs the scene at many points of its parameters' ranges and ranks the parameters for each output at "
-        "the last frame: force on every collider, mean (rms) and largest displacement of the outer surface, "
+        "the last frame: force on every collider, rms and largest displacement of the outer surface, "
         "and with an experiment the amplitude of its wrinkles. By default Morris's elementary effects, "
         "trajectories x (parameters + 1) runs; with --sobol N first-order and total Sobol indices, N x "
         "(parameters + 2) runs. Every run is kept: the same command goes on after a stop, and --shard I/N "

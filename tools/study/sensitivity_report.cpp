@@ -22,19 +22,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Parameters whose response is painted: the strongest ones.
+/// Parameters whose response is painted: so many of the strongest, and all ligament sources.
 constexpr std::size_t kPictures = 12;
 
 const char* transform_name(ParameterTransform t) {
   return t == ParameterTransform::log ? "log" : t == ParameterTransform::logit ? "logit" : "none";
 }
 
-/// A deviation of a coordinate as people read it: "3 %", "a factor 2.1", "open".
+/// A deviation of a coordinate as people read it: "3 %", "factor 2.1", of the odds for logit ones.
 std::string deviation_text(double deviation, ParameterTransform transform) {
+  constexpr double most = 3;  // a factor of 20 is as good as nothing
   if (!std::isfinite(deviation)) return "open";
   if (deviation == 0) return "held";
-  if (deviation < 0.3 || transform != ParameterTransform::log) return short_text(100 * deviation, 2) + " %";
-  return deviation < 20 ? "factor " + short_text(std::exp(deviation), 2) : "open";
+  if (deviation < 0.3 || transform == ParameterTransform::none) return short_text(100 * deviation, 2) + " %";
+  const std::string of = transform == ParameterTransform::logit ? "odds factor " : "factor ";
+  return of + (deviation < most ? short_text(std::exp(deviation), 2) : "> " + short_text(std::exp(most), 2));
 }
 
 std::vector<int> strongest_first(const Sensitivity& s) {
@@ -178,9 +180,10 @@ std::string json_text(const Sensitivity& s, const SensitivityOptions& options) {
 std::vector<StudyPicture> draw_responses(const std::string& folder, const SceneModel& scene_model,
                                          const Sensitivity& s, double end_time) {
   std::vector<StudyPicture> pictures;
+  std::size_t rank = 0;
   for (const int k : strongest_first(s)) {
-    if (pictures.size() == kPictures) break;
     const ParameterSpec& p = s.parameters[k];
+    if (++rank > kPictures && !p.address.starts_with("/ligaments/sources/")) continue;
     const std::string file = "response_" + file_name(p.name) + ".png";
     draw_on_skin(scene_model, s.response.last.col(k), "mm per unit", p.name, folder + "/" + file,
                  ColourMap::sequential, end_time);
@@ -247,14 +250,15 @@ std::string sensitivity_text(const Sensitivity& s, const SensitivityOptions& opt
                deviation_text(s.held_deviations[k], p.transform)});
   }
   std::string text =
-      "Motion of the surface per unit of log or logit coordinate, and predicted deviations of\n" +
+      "Motion of the surface per unit of log or logit coordinate, and predicted deviations (of parameters,\n"
+      "of the odds of fractions) from " +
       observed_text(options) + "\n\n" + table.text() + "\n";
   if (!s.without_effect.empty()) {
     text += "Without effect:";
     for (const std::string& address : s.without_effect) text += " " + address;
     text += "\n";
   }
-  text += "Positions tell " + std::to_string(s.directions.rank) + " of " +
+  text += "Without noise positions tell " + std::to_string(s.directions.rank) + " of " +
           std::to_string(s.parameters.size()) + " directions.\n";
   for (const std::string& sentence : s.sentences) text += "- " + sentence + "\n";
   return text;
@@ -291,7 +295,7 @@ void write_sensitivity(const std::string& folder, const SceneModel& scene_model,
                   "Motion of the surface per unit, strongest first");
   for (const std::string& address : s.without_effect) page.note(address + " has no effect.");
   page.section("directions", "What positions tell");
-  page.paragraph("Of " + std::to_string(s.parameters.size()) + " directions, positions tell " +
+  page.paragraph("Of " + std::to_string(s.parameters.size()) + " directions, positions without noise tell " +
                  std::to_string(s.directions.rank) + ".");
   if (!s.sentences.empty()) page.list(s.sentences);
   page.table(direction_table(s));
