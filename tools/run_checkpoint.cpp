@@ -12,7 +12,7 @@
 namespace rhytid::tools {
 namespace {
 
-constexpr const char* format_name = "rhytid run state 2";
+constexpr const char* format_name = "rhytid run state 3";
 
 std::string bytes(const double* values, std::size_t count) {
   return {reinterpret_cast<const char*>(values), count * sizeof(double)};

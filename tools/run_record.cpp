@@ -1,5 +1,6 @@
 #include "tools/run_record.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "sim/core/build_info.h"
@@ -29,10 +30,16 @@ ordered_json schemes(const Scene& scene) {
   j["time"] =
       "one implicit step per substep; a step that fails is bisected, then started from softened contacts";
   const int passes = scene.time.lag_passes;
-  j["friction"] = passes == 1
-                      ? std::string("normal force and tangent plane lagged from the previous converged step")
-                      : "normal force and tangent plane lagged from the pass before, " +
-                            std::to_string(passes) + " passes a step";
+  const bool rubs = std::any_of(scene.colliders.begin(), scene.colliders.end(), [](const ColliderScene& c) {
+    return c.friction && c.friction->coefficient > 0;
+  });
+  if (!rubs)
+    j["friction"] = "none";
+  else if (passes == 1)
+    j["friction"] = "normal force and tangent plane lagged from the previous converged step";
+  else
+    j["friction"] = "normal force and tangent plane lagged from the pass before, " + std::to_string(passes) +
+                    " passes a step";
   j["minimiser"] = scene.solver.minimiser;
   j["kernels"] = skin_kernel_isa();
   return j;

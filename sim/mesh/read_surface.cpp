@@ -41,11 +41,10 @@ void refuse_giant(const TriangleSurface& surface) {
       (surface.vertices.colwise().maxCoeff() - surface.vertices.colwise().minCoeff()).maxCoeff();
   if (extent <= 5000) return;
   char text[160];
-  std::snprintf(
-      text, sizeof text,
-      ": extent %.4g m before the crop, expected at most 5 m; is mm_per_unit right (a head is about "
-      "250 mm wide)?",
-      extent / 1000);
+  std::snprintf(text, sizeof text,
+                ": extent %.4g m, where the crop finds nothing; is mm_per_unit right (a head is about "
+                "250 mm wide)?",
+                extent / 1000);
   throw InputError(surface.origin + text);
 }
 

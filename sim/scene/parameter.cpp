@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <utility>
 
 #include "sim/core/error.h"
 #include "sim/scene/collider_motion.h"
@@ -178,6 +179,13 @@ std::string expected_parameter(const Scene& scene, std::string_view address) {
   const auto is_kind = [rule](const Kind& kind) { return rule->pointer == kind.pattern; };
   if (is_number && std::none_of(std::begin(kinds), std::end(kinds), is_kind))
     return "a scalar that can be fitted, which this one is not; " + list;
+  for (const Kind& kind : kinds) {
+    const std::vector<std::string> names = item_names(scene, kind.pattern);
+    for (size_t i = 0; i < names.size(); ++i)
+      if (kind.member(const_cast<Scene&>(scene), i) == nullptr &&
+          (address == filled(kind.pattern, names[i]) || address == filled(kind.pattern, std::to_string(i))))
+        return "a value that this scene has and that is not 0; " + list;
+  }
   std::vector<std::string> addresses;
   for (const Found& found : find_all(scene)) addresses.push_back(found.address);
   const std::string nearest = nearest_word(address, addresses);
@@ -205,7 +213,11 @@ void set_parameter(Scene& scene, std::string_view address, double value) {
     const std::string file = scene.file.empty() ? "" : scene.file + ": ";
     throw InputError(file + found.address, text, expectation(rule));
   }
-  *found.kind->member(scene, found.item) = value;
+  double& member = *found.kind->member(scene, found.item);
+  const double before = std::exchange(member, value);
+  if (found.kind->member(scene, found.item) != nullptr) return;
+  member = before;  // of this kind 0 is no parameter any more
+  throw InputError((scene.file.empty() ? "" : scene.file + ": ") + found.address, "0", "a number > 0");
 }
 
 }  // namespace rhytid

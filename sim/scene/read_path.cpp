@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <numbers>
 
 #include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
@@ -37,21 +36,11 @@ std::vector<std::size_t> read_header(const CsvLine& line) {
   return meaning;
 }
 
-/// Axis times angle of a rotation, rad.
+/// Axis times angle of a rotation, at most half a turn, rad.
 Vec3 rotation_vector(const Eigen::Quaterniond& q) {
   const double sine = q.vec().norm();
   if (sine < 1e-300) return Vec3::Zero();
-  return 2 * std::atan2(sine, q.w()) / sine * q.vec();
-}
-
-/// The same orientation, by as many whole turns more or less that it is nearest to `before`: knots that follow each
-/// other closely then do so as numbers, too.
-Vec3 nearest_turn(const Vec3& turn, const Vec3& before) {
-  const bool is_none = turn.norm() < 1e-12;
-  if (is_none && before.norm() < 1e-12) return turn;
-  const Vec3 axis = (is_none ? before : turn).normalized();
-  const double whole = 2 * std::numbers::pi;
-  return turn + std::round((before - turn).dot(axis) / whole) * whole * axis;
+  return 2 * std::atan2(sine, std::fabs(q.w())) / std::copysign(sine, q.w()) * q.vec();
 }
 
 }  // namespace
@@ -76,8 +65,7 @@ std::vector<PathKnot> read_path(const std::string& file) {
     if (!knots.empty() && value[0] <= knots.back().time)
       throw InputError(line.place, "time " + std::to_string(value[0]) + " s",
                        "a time later than that before");
-    const Vec3 before = knots.empty() ? Vec3(Vec3::Zero()) : knots.back().rotation;
-    knots.push_back({value[0], Vec3(value[1], value[2], value[3]), nearest_turn(rotation_vector(q), before)});
+    knots.push_back({value[0], Vec3(value[1], value[2], value[3]), rotation_vector(q)});
   });
   if (knots.empty()) throw InputError(file, "no knots", "a header and at least one line of numbers");
   return knots;

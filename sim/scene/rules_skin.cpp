@@ -421,7 +421,9 @@ std::vector<Rule> ligament_rules() {
        .dimension = dimension::per_length,
        .fallback = source.strength,
        .min = 0,
-       .doc = "Exponent b at the source; where b is 0 ligaments pull with the same force at any length."},
+       .doc = "Exponent b at the source; 0 is the limit of the law: exponential ligaments pull with the same "
+              "force at any length, quadratic ones "
+              "are linear springs."},
       {.pointer = "/ligaments/sources/*/radius",
        .type = number,
        .dimension = dimension::length,

@@ -22,7 +22,7 @@ enum class ShapeKind { sphere, plane, imls, capsule, ellipsoid };
 
 struct LayerScene {
   std::string name;
-  double thickness = 0;       ///< mm; the mean of thickness_by_vertex when that is given
+  double thickness = 0;       ///< mm; with thickness_by_vertex its mean, over the patch once a model is built
   std::string thickness_map;  ///< resolved path of a file with a thickness per vertex, empty when constant
   std::vector<double>
       thickness_by_vertex;    ///< mm, by vertex of the input surface, NaN = none; from that file
@@ -93,7 +93,7 @@ struct BaseScene {
       ShapeKind::plane;         ///< plane | sphere | imls of the rest inner surface, or of `points` if given
   double stiffness = 1;         ///< kappa, MPa/mm
   double onset = 1e-3;          ///< eps_g, mm (0 = C¹ literal penalty)
-  Vec3 centre = Vec3::Zero();   ///< sphere centre or a plane point, mm
+  Vec3 centre = Vec3::Zero();   ///< sphere, mm
   double radius = 0;            ///< sphere, mm
   Vec3 normal = Vec3::UnitZ();  ///< plane
   double imls_support = 0;      ///< h, mm (0 = 3 × median point spacing)

@@ -14,7 +14,7 @@ GridPattern grid_pattern(const std::string& name) {
   return GridPattern::union_jack;
 }
 
-TriangleSurface cropped(TriangleSurface mesh, const SurfaceScene& s) {
+TriangleSurface cropped(const TriangleSurface& mesh, const SurfaceScene& s) {
   if (s.crop_centre && s.crop_by == "distance") return crop_sphere(mesh, *s.crop_centre, s.crop_radius);
   if (s.crop_centre) return crop_geodesic_disc(mesh, *s.crop_centre, s.crop_radius);
   if (s.crop_low) return crop_box(mesh, *s.crop_low, *s.crop_high);
@@ -67,10 +67,12 @@ TriangleSurface scene_surface(const SurfaceScene& s) {
   // Texture seams double vertices in glTF, which knows no other way.
   const bool has_seams = mesh.format.starts_with("binary glTF");
   if (s.coincident == "join" || (s.coincident == "auto" && has_seams)) join_coincident_vertices(mesh);
-  const bool is_cropped =
-      s.crop_centre || s.crop_low || !s.crop_vertices.empty() || !s.crop_vertices_file.empty();
-  if (is_cropped) refuse_giant(mesh);
-  mesh = cropped(std::move(mesh), s);
+  try {
+    mesh = cropped(mesh, s);
+  } catch (const InputError&) {
+    refuse_giant(mesh);  // says why the crop found nothing
+    throw;
+  }
   if (s.coincident == "auto") refuse_coincident_vertices(mesh);
   if (s.subdivide > 0) return subdivide_surface(mesh, s.subdivide);
   return mesh;

@@ -67,8 +67,10 @@ void warn_of_wrinkling_stack(const SkinScene& skin, std::vector<std::string>& wa
 
 /// Squeezed between finger and bone a nearly incompressible layer must bulge, which takes a cubic (figures:
 /// tests/verification/README.md, Locking).
-void warn_of_locking(const SkinScene& skin, std::vector<std::string>& warnings) {
-  if (skin.volume == VolumeQuadrature::reduced || skin.scheme != ThicknessScheme::stacked) return;
+void warn_of_locking(const Scene& scene, std::vector<std::string>& warnings) {
+  const SkinScene& skin = scene.skin;
+  if (!scene.base || skin.volume == VolumeQuadrature::reduced || skin.scheme != ThicknessScheme::stacked)
+    return;
   for (size_t i = 0; i < skin.layers.size(); ++i) {
     const LayerScene& layer = skin.layers[i];
     // A film that is bent, not squeezed, does not mind.
@@ -76,7 +78,7 @@ void warn_of_locking(const SkinScene& skin, std::vector<std::string>& warnings) 
     if (layer.order < 3 && layer.elements == 1 && layer.poissons_ratio >= 0.45 && !is_film)
       warnings.push_back(sentence("/skin/layers/", layer.name, "/order: ", layer.order,
                                   " locks at a Poisson's ratio of ", layer.poissons_ratio,
-                                  ": squeezed skin comes out up to twice as stiff; take order 3, or a "
+                                  ": squeezed skin comes out twice as stiff and more; take order 3, or a "
                                   "reduced volume"));
   }
 }
@@ -169,7 +171,7 @@ std::vector<std::string> scene_warnings(const Scene& scene) {
   std::vector<std::string> warnings;
   for (const LayerScene& layer : scene.skin.layers) warn_of_layer(layer, scene, warnings);
   warn_of_wrinkling_stack(scene.skin, warnings);
-  warn_of_locking(scene.skin, warnings);
+  warn_of_locking(scene, warnings);
   warn_of_unused_keys(scene, warnings);
   warn_of_quadrature(scene.skin, warnings);
   for (const ColliderScene& collider : scene.colliders) warn_of_collider(collider, scene.time, warnings);

@@ -16,6 +16,7 @@
 namespace rhytid::tools {
 namespace {
 
+using testing::AnyOf;
 using testing::Contains;
 using testing::Each;
 using testing::ElementsAre;
@@ -58,6 +59,9 @@ TEST(BundledScenes, rest_in_equilibrium) {
     const std::vector<std::string> warnings = review_scene(scene_model, cost);
     EXPECT_THAT(warnings, Not(Contains(HasSubstr("into the skin at time 0"))));
     EXPECT_THAT(warnings, Not(Contains(HasSubstr("never touches"))));
+    // Nothing that is not read, and no element that locks where it is squeezed.
+    EXPECT_THAT(scene_warnings(scene_model.scene()),
+                Each(Not(AnyOf(HasSubstr("is not used"), HasSubstr("locks")))));
   }
 }
 

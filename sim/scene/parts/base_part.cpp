@@ -44,17 +44,20 @@ void refuse_inside_out(const ImplicitShape& shape, const SkinMesh& mesh, const V
   for (int column = 0; column < mesh.num_columns; ++column) {
     const Vec3 x = inner.row(column), n = mesh.column_normals.row(column);
     const GapJet jet = shape.evaluate(x - centre);
-    if (jet.supported) ++(jet.gradient.dot(n) > 0 ? towards : away);
+    const double facing = jet.gradient.dot(n);
+    if (jet.supported && facing != 0) ++(facing > 0 ? towards : away);
   }
   if (away <= towards) return;
   if (base.points)
     throw InputError(base.points->file, "normals that point away from the skin",
                      "normals out of the bone, towards the skin");
-  const bool is_plane = base.shape == ShapeKind::plane;
-  throw InputError(
-      (scene.file.empty() ? "" : scene.file + ": ") + (is_plane ? "/base/normal" : "/base/centre"),
-      is_plane ? "a plane that faces away from the skin" : "a sphere whose far side the skin is on",
-      "bone under the inner surface, facing it");
+  const std::string file = scene.file.empty() ? "" : scene.file + ": ",
+                    expected = "bone under the inner surface, facing it";
+  if (base.shape == ShapeKind::plane)
+    throw InputError(file + "/base/normal", "a plane that faces away from the skin", expected);
+  if (base.shape == ShapeKind::sphere)
+    throw InputError(file + "/base/centre", "a sphere whose far side the skin is on", expected);
+  throw InputError(file + "/base", "an inner surface whose own bone faces away from it", expected);
 }
 
 /// An IMLS surface stands where its points are; the others are moved to their centre.

@@ -8,7 +8,8 @@
 
 namespace rhytid {
 
-/// The prism mesh of a scene: reads or makes the surface, crops, bends, extrudes. Throws InputError.
+/// The prism mesh of a scene: reads or makes the surface, crops, bends, extrudes. The thickness of a layer
+/// with values per vertex becomes their mean over the patch. Throws InputError.
 SkinMesh build_skin_mesh(Scene& scene);
 
 class SkinPart final : public ScenePart {

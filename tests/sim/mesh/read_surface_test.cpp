@@ -90,6 +90,8 @@ TEST(ReadSurface, RefusesGiantsBeforeACropFindsNothing) {
     EXPECT_THAT(input_error([&] { (void)scene_surface(scene); }),
                 AllOf(HasSubstr("giant.obj: extent "), HasSubstr("is mm_per_unit right")));
   }
+  scene.crop_radius = 1e9;  // whoever means it
+  EXPECT_NO_THROW((void)scene_surface(scene));
 }
 
 // Rotation by 90° about z, then doubling, then a shift: x ↦ 2 (−y, x, z) + (1, 2, 3).
