@@ -168,6 +168,8 @@ TEST(Screen, RunsThatDoNotConvergeAreCountedAndLeftOut) {
       with(kTwoParameters, {"--set", "/solver/max_iterations=1", "--set", "/time/max_bisections=0"}));
   EXPECT_EQ(call.code, 3);
   EXPECT_THAT(call.out, HasSubstr("did not converge and do not count"));
+  EXPECT_TRUE(place.has("out/effects.csv")) << "none of them ran, and it is a Morris screening all the same";
+  EXPECT_FALSE(place.has("out/indices.csv"));
 }
 
 TEST(Screen, RefusesInOneLine) {

@@ -218,8 +218,9 @@ class Screen {
         result_.values(i, k) = one->columns[static_cast<std::size_t>(k)].value.value_or(kNan);
     }
     const auto inputs = static_cast<int>(result_.ranges.size());
+    result_.is_sobol = options_.sobol_samples > 0;
     for (Eigen::Index k = 0; k < columns; ++k)
-      if (options_.sobol_samples > 0)
+      if (result_.is_sobol)
         result_.sobol.push_back(
             sobol_indices(inputs, options_.sobol_samples, result_.values.col(k), options_.seed));
       else

@@ -34,6 +34,7 @@ struct ScreenResult {
   MatrixXd values;                         ///< [runs of the design][outputs]; NaN = missing
   std::vector<std::string> status;         ///< per run of the design: complete, not_converged or missing
   int runs = 0, finished = 0, failed = 0;  ///< different points; failed ones count as finished
+  bool is_sobol = false;                   ///< else Morris, also while no run is there
   std::vector<std::vector<MorrisEffect>> morris;  ///< [outputs][parameters], or empty
   std::vector<std::vector<SobolIndex>> sobol;     ///< likewise
 };

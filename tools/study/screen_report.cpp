@@ -28,7 +28,7 @@ std::string heading(const ResultColumn& output) {
 
 /// What a parameter counts for an output: μ*, or the total index.
 double weight(const ScreenResult& r, std::size_t output, std::size_t k) {
-  return r.morris.empty() ? r.sobol[output][k].total : r.morris[output][k].mean_absolute;
+  return r.is_sobol ? r.sobol[output][k].total : r.morris[output][k].mean_absolute;
 }
 
 std::vector<std::size_t> ranked(const ScreenResult& r, std::size_t output) {
@@ -73,8 +73,8 @@ void write_effects(const std::string& folder, const ScreenResult& r) {
   std::vector<CsvColumn> columns = {
       {"output", ""}, {"unit", ""}, {"address", ""}, {"lower", ""}, {"upper", ""}};
   const std::vector<const char*> figures =
-      r.morris.empty() ? std::vector<const char*>{"first", "first_error", "total", "total_error", "count"}
-                       : std::vector<const char*>{"mu", "mu_star", "mu_star_error", "sigma", "count"};
+      r.is_sobol ? std::vector<const char*>{"first", "first_error", "total", "total_error", "count"}
+                 : std::vector<const char*>{"mu", "mu_star", "mu_star_error", "sigma", "count"};
   for (const char* figure : figures) columns.push_back({figure, ""});
   CsvTable table(columns);
   for (std::size_t o = 0; o < r.outputs.size(); ++o)
@@ -83,7 +83,7 @@ void write_effects(const std::string& folder, const ScreenResult& r) {
       std::vector<CsvCell> row = {r.outputs[o].name, r.outputs[o].unit, range.spec.address, range.lower,
                                   range.upper};
       std::int64_t count = 0;
-      if (r.morris.empty()) {
+      if (r.is_sobol) {
         const SobolIndex& s = r.sobol[o][k];
         for (const double x : {s.first, s.first_error, s.total, s.total_error}) row.emplace_back(x);
         count = s.count;
@@ -95,7 +95,7 @@ void write_effects(const std::string& folder, const ScreenResult& r) {
       row.emplace_back(count);
       table.add_row(std::move(row));
     }
-  table.write(folder + (r.morris.empty() ? "/indices.csv" : "/effects.csv"));
+  table.write(folder + (r.is_sobol ? "/indices.csv" : "/effects.csv"));
 }
 
 /// μ* against σ.
@@ -137,7 +137,7 @@ std::string scatter(const ScreenResult& r, std::size_t output) {
 /// μ* of all parameters with its standard error, or both indices.
 std::string ranking(const ScreenResult& r, std::size_t output) {
   const auto order = ranked(r, output);
-  if (r.morris.empty()) {
+  if (r.is_sobol) {
     BarChart chart;
     chart.title = heading(r.outputs[output]);
     chart.y.label = "share of the variance";
@@ -169,7 +169,7 @@ std::string ranking(const ScreenResult& r, std::size_t output) {
 HtmlTable overview(const ScreenResult& r) {
   HtmlTable table;
   table.header = {"parameter", "range"};
-  table.caption = r.morris.empty() ? "Total indices" : "mu* of each output, as a part of its largest";
+  table.caption = r.is_sobol ? "Total indices" : "mu* of each output, as a part of its largest";
   for (const ResultColumn& output : r.outputs) table.header.push_back(heading(output));
   for (std::size_t k = 0; k < r.ranges.size(); ++k) {
     const ParameterRange& range = r.ranges[k];
@@ -177,7 +177,7 @@ HtmlTable overview(const ScreenResult& r) {
                                   short_text(range.lower, 3) + " to " + short_text(range.upper, 3) +
                                       (range.spec.unit.empty() ? "" : " " + range.spec.unit)};
     for (std::size_t o = 0; o < r.outputs.size(); ++o) {
-      const double largest = r.morris.empty() ? 1 : weight(r, o, ranked(r, o).front());
+      const double largest = r.is_sobol ? 1 : weight(r, o, ranked(r, o).front());
       const double part = weight(r, o, k) / largest;
       if (std::isfinite(part))
         row.emplace_back(fixed_text(part, 2), map_colour(ColourMap::sequential, part));
@@ -192,16 +192,14 @@ HtmlTable overview(const ScreenResult& r) {
 }  // namespace
 
 std::string screen_text(const ScreenResult& r) {
-  std::string text =
-      (r.morris.empty() ? "Sobol indices: first order and total share of the variance"
-                        : "Morris: mu* (mean size of elementary effects over the range) and sigma") +
-      std::string("\n") + state_text(r) + "\n";
+  std::string text = (r.is_sobol ? "Sobol indices: first order and total share of the variance"
+                                 : "Morris: mu* (mean size of elementary effects over the range) and sigma") +
+                     std::string("\n") + state_text(r) + "\n";
   for (std::size_t o = 0; o < r.outputs.size(); ++o) {
-    TextTable table(r.morris.empty()
-                        ? std::vector<std::string>{heading(r.outputs[o]), "first", "+-", "total", "+-"}
-                        : std::vector<std::string>{heading(r.outputs[o]), "mu*", "+-", "mu", "sigma"});
+    TextTable table(r.is_sobol ? std::vector<std::string>{heading(r.outputs[o]), "first", "+-", "total", "+-"}
+                               : std::vector<std::string>{heading(r.outputs[o]), "mu*", "+-", "mu", "sigma"});
     for (const std::size_t k : ranked(r, o)) {
-      if (r.morris.empty()) {
+      if (r.is_sobol) {
         const SobolIndex& s = r.sobol[o][k];
         table.add({r.ranges[k].spec.name, shown(s.first), shown(s.first_error, 2), shown(s.total),
                    shown(s.total_error, 2)});
@@ -218,9 +216,17 @@ std::string screen_text(const ScreenResult& r) {
 
 void write_screen(const std::string& folder, const std::string& title, const ScreenResult& r) {
   std::error_code ignored;
-  for (const char* old : {"effects.csv", "indices.csv"}) fs::remove(folder + "/" + old, ignored);
-  for (const auto& entry : fs::directory_iterator(folder, ignored))
-    if (entry.path().extension() == ".svg") fs::remove(entry.path(), ignored);
+  // Plots of outputs that an earlier screening had and this one has not; nothing in a folder that is not its own.
+  if (fs::exists(folder + "/screen.txt")) {
+    for (const char* old : {"effects.csv", "indices.csv"}) fs::remove(folder + "/" + old, ignored);
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+      const std::string stem = entry.path().stem().string();
+      const bool is_output = stem.starts_with("force_") || stem.starts_with("mean_displacement") ||
+                             stem.starts_with("max_displacement") ||
+                             stem.find("amplitude") != std::string::npos;
+      if (is_output && entry.path().extension() == ".svg") fs::remove(entry.path(), ignored);
+    }
+  }
   write_runs(folder, r);
   write_effects(folder, r);
   write_file(folder + "/screen.txt", screen_text(r));
@@ -228,7 +234,7 @@ void write_screen(const std::string& folder, const std::string& title, const Scr
   HtmlPage page("Screening" + (title.empty() ? std::string() : " of " + title), state_text(r));
   page.section("overview", "Overview");
   page.paragraph(
-      r.morris.empty()
+      r.is_sobol
           ? "Total indices: the share of an output's variance that would remain if all but this "
             "parameter were known; about zero: it may be fixed anywhere in its range."
           : "Elementary effects of parameters over their whole range (evenly in log or logit "
@@ -241,7 +247,7 @@ void write_screen(const std::string& folder, const std::string& title, const Scr
     const std::string drawn = ranking(r, o);
     write_file(folder + "/" + r.outputs[o].name + "_ranking.svg", drawn);
     page.svg_figure(drawn, "ranking of parameters for " + heading(r.outputs[o]), "Ranking");
-    if (r.morris.empty()) continue;
+    if (r.is_sobol) continue;
     const std::string points = scatter(r, o);
     write_file(folder + "/" + r.outputs[o].name + ".svg", points);
     page.svg_figure(points, "mu* against sigma for " + heading(r.outputs[o]), "mu* against sigma");

@@ -267,8 +267,11 @@ std::string sensitivity_text(const Sensitivity& s, const SensitivityOptions& opt
 void write_sensitivity(const std::string& folder, const SceneModel& scene_model, double end_time,
                        const Sensitivity& s, const SensitivityOptions& options) {
   std::error_code ignored;
+  // Of an earlier study only; nothing in a folder that is not its own.
+  const bool is_own = fs::exists(folder + "/sensitivity.json");
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();
+    if (!is_own) break;
     if ((name.starts_with("response_") && name.ends_with(".png")) || name.starts_with("map."))
       fs::remove(entry.path(), ignored);
   }
