@@ -326,18 +326,12 @@ void Certification::error_bar() {
 }
 
 void Certification::pivots() {
-  const SweepReport& s = report_.steps;
-  std::vector<double> ratio;
-  for (std::size_t i = 0; i < s.smallest_pivot.size(); ++i)
-    ratio.push_back(s.smallest_pivot[i] / s.largest_pivot[i]);
-  if (ratio.empty()) return;
-  std::vector<double> sorted = ratio;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<long>(sorted.size() / 2), sorted.end());
-  const double median = sorted[sorted.size() / 2];
-  const auto least = std::min_element(ratio.begin(), ratio.end());
-  const auto step = static_cast<std::size_t>(least - ratio.begin());
-  const bool dips = *least < options_.pivot_dip * median;
-  add({"pivots", *least / median, options_.pivot_dip, dips ? Verdict::warning : Verdict::pass,
+  const std::vector<double> pivots = report_.steps.relative_pivots();
+  if (pivots.empty()) return;
+  const auto least = std::min_element(pivots.begin(), pivots.end());
+  const auto step = static_cast<std::size_t>(least - pivots.begin());
+  const bool dips = *least < options_.pivot_dip;
+  add({"pivots", *least, options_.pivot_dip, dips ? Verdict::warning : Verdict::pass,
        text(dips
                 ? "the Hessian comes near to singular at step %zu (t = %.4g s): a bifurcation is near, "
                   "derivatives hold in a small neighbourhood only"

@@ -4,6 +4,40 @@
 
 namespace rhytid::adjoint {
 
+VectorXd Output::step_values(int frame, const StepProblem&, const State& state) const {
+  return values(frame, state);
+}
+
+MatrixXd Output::step_tangent(int frame, const StepProblem&, const State& state,
+                              const StepDirections& directions) const {
+  return tangent(frame, state, directions.du, directions.ds);
+}
+
+void Output::step_adjoint(int frame, const StepProblem&, const State& state, const VectorXd& weights,
+                          StepBars& bars) const {
+  adjoint(frame, state, weights, bars.u, bars.s);
+}
+
+namespace {
+[[noreturn]] void refuse_rest(int frame) {
+  throw ContractError("StepOutput: no step led to frame " + std::to_string(frame));
+}
+}  // namespace
+
+VectorXd StepOutput::values(int frame, const State&) const {
+  if (size(frame) > 0) refuse_rest(frame);
+  return {};
+}
+
+MatrixXd StepOutput::tangent(int frame, const State&, const MatrixXd& du, const MatrixXd&) const {
+  if (size(frame) > 0) refuse_rest(frame);
+  return MatrixXd(0, du.cols());
+}
+
+void StepOutput::adjoint(int frame, const State&, const VectorXd&, VectorXd&, VectorXd&) const {
+  if (size(frame) > 0) refuse_rest(frame);
+}
+
 PointInterpolation::PointInterpolation(const SkinMesh& mesh, std::vector<MaterialPoint> points)
     : points_(std::move(points)), num_nodes_(mesh.nodes_per_face()), rest_(points_.size(), 3) {
   const TriangleBasis basis(mesh.order);
@@ -109,34 +143,62 @@ int CombinedOutput::size(int frame) const {
   return sum;
 }
 
-VectorXd CombinedOutput::values(int frame, const State& state) const {
-  VectorXd out(size(frame));
+template <class Visit>
+void CombinedOutput::for_parts(int frame, Visit&& visit) const {
   Eigen::Index at = 0;
   for (const auto& part : parts_) {
-    out.segment(at, part->size(frame)) = part->values(frame, state);
-    at += part->size(frame);
+    const Eigen::Index count = part->size(frame);
+    if (count > 0) visit(*part, at, count);
+    at += count;
   }
+}
+
+VectorXd CombinedOutput::values(int frame, const State& state) const {
+  VectorXd out(size(frame));
+  for_parts(frame, [&](const Output& part, Eigen::Index at, Eigen::Index count) {
+    out.segment(at, count) = part.values(frame, state);
+  });
   return out;
 }
 
 MatrixXd CombinedOutput::tangent(int frame, const State& state, const MatrixXd& du,
                                  const MatrixXd& ds) const {
   MatrixXd out(size(frame), du.cols());
-  Eigen::Index at = 0;
-  for (const auto& part : parts_) {
-    out.middleRows(at, part->size(frame)) = part->tangent(frame, state, du, ds);
-    at += part->size(frame);
-  }
+  for_parts(frame, [&](const Output& part, Eigen::Index at, Eigen::Index count) {
+    out.middleRows(at, count) = part.tangent(frame, state, du, ds);
+  });
   return out;
 }
 
 void CombinedOutput::adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
                              VectorXd& s_bar) const {
-  Eigen::Index at = 0;
-  for (const auto& part : parts_) {
-    part->adjoint(frame, state, weights.segment(at, part->size(frame)), u_bar, s_bar);
-    at += part->size(frame);
-  }
+  for_parts(frame, [&](const Output& part, Eigen::Index at, Eigen::Index count) {
+    part.adjoint(frame, state, weights.segment(at, count), u_bar, s_bar);
+  });
+}
+
+VectorXd CombinedOutput::step_values(int frame, const StepProblem& step, const State& state) const {
+  VectorXd out(size(frame));
+  for_parts(frame, [&](const Output& part, Eigen::Index at, Eigen::Index count) {
+    out.segment(at, count) = part.step_values(frame, step, state);
+  });
+  return out;
+}
+
+MatrixXd CombinedOutput::step_tangent(int frame, const StepProblem& step, const State& state,
+                                      const StepDirections& directions) const {
+  MatrixXd out(size(frame), directions.du.cols());
+  for_parts(frame, [&](const Output& part, Eigen::Index at, Eigen::Index count) {
+    out.middleRows(at, count) = part.step_tangent(frame, step, state, directions);
+  });
+  return out;
+}
+
+void CombinedOutput::step_adjoint(int frame, const StepProblem& step, const State& state,
+                                  const VectorXd& weights, StepBars& bars) const {
+  for_parts(frame, [&](const Output& part, Eigen::Index at, Eigen::Index count) {
+    part.step_adjoint(frame, step, state, weights.segment(at, count), bars);
+  });
 }
 
 }  // namespace rhytid::adjoint

@@ -1,6 +1,11 @@
-// What is differentiated: quantities read off the state at the end of a frame.
+// What is differentiated: quantities read off the state at the end of a frame, or off the step that led
+// there.
 //
-// To add one: derive from Output, give values, tangent and adjoint of one frame (they must pair:
+//   q(u, s)                        Output: what the state shows (positions)
+//   q(u, s; u_old, s_old, θ, t)    StepOutput: what also depends on where bodies are, on the old state or on
+//                                  native parameters themselves (forces of contact and friction, energies)
+//
+// To add one: derive from either, give size, values, tangent and adjoint of one frame (they must pair:
 // tests/adjoint checks <J v, w> = <v, Jᵀ w> for every output), and pass it to the sweeps. Nothing else needs
 // to know.
 #pragma once
@@ -11,6 +16,20 @@
 #include "sim/time/model.h"
 
 namespace rhytid::adjoint {
+
+/// Derivatives along k directions at a step: of its end, of its start and of the native parameters. A step
+/// solved in several passes: the start of its last pass, whose lag is that of the pass before.
+struct StepDirections {
+  MatrixXd du, ds;          ///< [num_nodes·3][k], [history][k]
+  MatrixXd du_old, ds_old;  ///< the same at the start
+  MatrixXd dnative;         ///< [native size][k]
+};
+
+/// What the transposed derivative of an output at a step is added to; shapes as in StepDirections, one
+/// column.
+struct StepBars {
+  VectorXd &u, &s, &u_old, &s_old, &native;
+};
 
 /// A vector-valued function of the state at the end of a frame (0 = rest). Immutable while a sweep runs.
 class Output {
@@ -25,6 +44,29 @@ class Output {
   /// Adds the transposed derivative applied to weights [size(frame)] to u_bar and s_bar.
   virtual void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
                        VectorXd& s_bar) const = 0;
+
+  /// The same three as the sweeps ask for them, with the (last pass of the) step that led to the frame; frame
+  /// 0 of a run that starts at rest has none. Here: nothing but the state matters.
+  virtual VectorXd step_values(int frame, const StepProblem& step, const State& state) const;
+  virtual MatrixXd step_tangent(int frame, const StepProblem& step, const State& state,
+                                const StepDirections& directions) const;
+  virtual void step_adjoint(int frame, const StepProblem& step, const State& state, const VectorXd& weights,
+                            StepBars& bars) const;
+};
+
+/// An output that the state alone does not tell: derive and give the three functions of a step. It has no
+/// value where no step led: asked at rest it throws ContractError.
+class StepOutput : public Output {
+ public:
+  VectorXd values(int frame, const State& state) const final;
+  MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const final;
+  void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
+               VectorXd& s_bar) const final;
+  VectorXd step_values(int frame, const StepProblem& step, const State& state) const override = 0;
+  MatrixXd step_tangent(int frame, const StepProblem& step, const State& state,
+                        const StepDirections& directions) const override = 0;
+  void step_adjoint(int frame, const StepProblem& step, const State& state, const VectorXd& weights,
+                    StepBars& bars) const override = 0;
 };
 
 /// A point fixed to the skin: a place on the inner or outer surface in natural coordinates of a face.
@@ -100,8 +142,16 @@ class CombinedOutput final : public Output {
   MatrixXd tangent(int frame, const State& state, const MatrixXd& du, const MatrixXd& ds) const override;
   void adjoint(int frame, const State& state, const VectorXd& weights, VectorXd& u_bar,
                VectorXd& s_bar) const override;
+  VectorXd step_values(int frame, const StepProblem& step, const State& state) const override;
+  MatrixXd step_tangent(int frame, const StepProblem& step, const State& state,
+                        const StepDirections& directions) const override;
+  void step_adjoint(int frame, const StepProblem& step, const State& state, const VectorXd& weights,
+                    StepBars& bars) const override;
 
  private:
+  /// Calls visit(part, first value, number of values) for every part with values in the frame.
+  template <class Visit>
+  void for_parts(int frame, Visit&& visit) const;
   std::vector<std::shared_ptr<const Output>> parts_;
 };
 

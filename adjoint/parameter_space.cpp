@@ -12,8 +12,11 @@ ParameterSpace::ParameterSpace(const SceneModel& scene_model, const std::vector<
     const bool fits = spec.transform == ParameterTransform::log     ? p > 0
                       : spec.transform == ParameterTransform::logit ? p > spec.lower && p < spec.upper
                                                                     : true;
+    const double half_range = 0.5 * (spec.upper - spec.lower);
+    scale_.push_back(spec.transform == ParameterTransform::none ? half_range
+                     : p != 0                                   ? std::fabs(p)
+                                                                : 2 * half_range);
     if (!fits) spec.transform = ParameterTransform::none;
-    scale_.push_back(p != 0 ? std::fabs(p) : spec.upper - spec.lower);
     const double slope = spec.transform == ParameterTransform::log ? p
                          : spec.transform == ParameterTransform::logit
                              ? (p - spec.lower) * (spec.upper - p) / (spec.upper - spec.lower)

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "adjoint/resimulate.h"
 #include "sim/core/error.h"
 #include "sim/time/step_passes.h"
 
@@ -116,6 +117,12 @@ VectorXd retreat_adjoint(const StepProblem& problem, const VectorXd& u, const Ch
   return s_old_bar;
 }
 
+long count_changes(const std::vector<signed char>& a, const std::vector<signed char>& b) {
+  long count = 0;
+  for (std::size_t q = 0; q < a.size(); ++q) count += a[q] != b[q];
+  return count;
+}
+
 /// Splits a history into what lags (returned; zero elsewhere) and the rest (kept; zero where it lags).
 VectorXd take_lag(const Model& model, VectorXd& history) {
   VectorXd lag = VectorXd::Zero(history.size());
@@ -131,6 +138,26 @@ VectorXd take_lag(const Model& model, VectorXd& history) {
 
 }  // namespace
 
+std::vector<double> SweepReport::relative_pivots() const {
+  std::vector<double> ratio;
+  for (std::size_t i = 0; i < smallest_pivot.size(); ++i)
+    ratio.push_back(smallest_pivot[i] / largest_pivot[i]);
+  if (ratio.empty()) return ratio;
+  std::vector<double> sorted = ratio;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<long>(sorted.size() / 2), sorted.end());
+  const double median = sorted[sorted.size() / 2];
+  for (double& r : ratio) r = median > 0 ? r / median : 0;
+  return ratio;
+}
+
+std::vector<int> SweepReport::near_singular_steps(double dip) const {
+  const std::vector<double> pivots = relative_pivots();
+  std::vector<int> steps;
+  for (std::size_t i = 0; i < pivots.size(); ++i)
+    if (pivots[i] < dip) steps.push_back(static_cast<int>(i));
+  return steps;
+}
+
 TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Trajectory& run,
                             const Output& output, const MatrixXd& directions) {
   check_run(run);
@@ -142,17 +169,9 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
   for (int k = 0; k < count; ++k) columns.push_back(directions.col(k));
   std::vector<Block> du(chunks, Block::Zero(nu, D)), ds(chunks, Block::Zero(nh, D));
   TangentResult result;
-  const auto record_frame = [&](int frame, const State& state) {
-    MatrixXd out(output.size(frame), count);
-    for (int c = 0; c < chunks && out.rows() > 0; ++c) {
-      const int width = std::min(D, count - c * D);
-      out.middleCols(c * D, width) =
-          output.tangent(frame, state, MatrixXd(du[c].leftCols(width)), MatrixXd(ds[c].leftCols(width)));
-    }
-    result.frames.push_back(std::move(out));
-  };
   const bool starts_at_rest = run.frame_end.front() == 0;  // else a settling step leads to frame 0
-  if (starts_at_rest) record_frame(0, run.initial);
+  if (starts_at_rest)
+    result.frames.push_back(MatrixXd::Zero(output.size(0), count));  // rest depends on nothing
   const auto directions_of = [&](int chunk) {
     std::vector<const VectorXd*> list;
     for (int k = chunk * D; k < std::min(count, chunk * D + D); ++k) list.push_back(&columns[k]);
@@ -162,10 +181,12 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
   BlockMatrix matrix(model.pattern());
   CholeskyFactor factor(model.pattern());
   int frame = starts_at_rest ? 1 : 0;
+  SharedState old = first_state(run);
+  std::vector<signed char> regimes;
   for (int i = 0; i < static_cast<int>(run.steps.size()); ++i) {
     const StepRecord& record = run.steps[i];
-    const State& old = run.before(i);
-    StepPasses passes(model, native, record.step, old, record.earlier_passes);
+    StepPasses passes(model, native, record.step, *old, record.earlier_passes);
+    SharedState state = state_after(run, i, passes);
     // Every pass is a step of its own from the same state but for the lag, which it hands to the next.
     for (int j = 0; j + 1 < passes.count(); ++j) {
       StepProblem& pass = passes.pass(j);
@@ -175,13 +196,27 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
         ds[c] = advance_tangent(pass, u, factor, directions_of(c), du[c], ds[c], true).ds;
     }
     factor_step(passes.last(), record, matrix, factor, result.report, nullptr);
+    const int first_frame = frame;
+    for (; frame <= run.frames() && run.frame_end[frame] == i + 1; ++frame)
+      result.frames.emplace_back(output.size(frame), count);
     for (int c = 0; c < chunks; ++c) {
       TangentPair next =
           advance_tangent(passes.last(), record.state.u, factor, directions_of(c), du[c], ds[c], false);
+      const int width = std::min(D, count - c * D);
+      for (int f = first_frame; f < frame; ++f) {
+        if (output.size(f) == 0) continue;
+        result.frames[f].middleCols(c * D, width) =
+            output.step_tangent(f, passes.last(), *state,
+                                {next.du.leftCols(width), next.ds.leftCols(width), du[c].leftCols(width),
+                                 ds[c].leftCols(width), directions.middleCols(c * D, width)});
+      }
       du[c] = std::move(next.du);
       ds[c] = std::move(next.ds);
     }
-    for (; frame <= run.frames() && run.frame_end[frame] == i + 1; ++frame) record_frame(frame, record.state);
+    std::vector<signed char> now_on = step_regimes(passes.last(), record.state.u);
+    result.report.regime_changes.push_back(i > 0 ? count_changes(regimes, now_on) : 0);
+    regimes = std::move(now_on);
+    old = std::move(state);
   }
   result.report.seconds = now() - start;
   return result;
@@ -189,6 +224,12 @@ TangentResult tangent_sweep(const Model& model, const VectorXd& native, const Tr
 
 AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Trajectory& run,
                             const Output& output, const std::vector<VectorXd>& weights) {
+  return adjoint_sweep_within(ReverseStates::unlimited, model, native, run, output, weights);
+}
+
+AdjointResult adjoint_sweep_within(std::size_t budget_bytes, const Model& model, const VectorXd& native,
+                                   const Trajectory& run, const Output& output,
+                                   const std::vector<VectorXd>& weights) {
   check_run(run);
   require(static_cast<int>(weights.size()) == run.frames() + 1, "adjoint_sweep: weights for every frame");
   const double start = now();
@@ -199,16 +240,21 @@ AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Tr
   BlockMatrix matrix(model.pattern());
   CholeskyFactor factor(model.pattern());
   int frame = run.frames();
-  for (int i = static_cast<int>(run.steps.size()) - 1; i >= 0; --i) {
+  const int num_steps = static_cast<int>(run.steps.size());
+  ReverseStates states(model, native, run, budget_bytes);
+  SharedState state = states.after(num_steps);
+  std::vector<signed char> regimes;
+  for (int i = num_steps - 1; i >= 0; --i) {
     const StepRecord& record = run.steps[i];
-    const State& old = run.before(i);
+    SharedState old = states.after(i);
+    StepPasses passes(model, native, record.step, *old, record.earlier_passes);
+    VectorXd residual, adj_q, u_old_bar = VectorXd::Zero(nu), s_old_bar = VectorXd::Zero(nh);
+    StepBars bars{u_bar, s_bar, u_old_bar, s_old_bar, result.native_bar};
     for (; frame >= 0 && run.frame_end[frame] == i + 1; --frame)
-      if (output.size(frame) > 0) output.adjoint(frame, record.state, weights[frame], u_bar, s_bar);
-    StepPasses passes(model, native, record.step, old, record.earlier_passes);
-    VectorXd residual, adj_q, u_old_bar = VectorXd::Zero(nu);
+      if (output.size(frame) > 0) output.step_adjoint(frame, passes.last(), *state, weights[frame], bars);
     factor_step(passes.last(), record, matrix, factor, result.report, &residual);
-    VectorXd s_old_bar = retreat_adjoint(passes.last(), record.state.u, factor, u_bar, s_bar, u_old_bar,
-                                         result.native_bar, adj_q);
+    s_old_bar += retreat_adjoint(passes.last(), record.state.u, factor, u_bar, s_bar, u_old_bar,
+                                 result.native_bar, adj_q);
     result.residual_error += adj_q.dot(residual);
     // Back through the earlier passes: each left the lag that the next started from, and nothing else.
     for (int j = passes.count() - 2; j >= 0; --j) {
@@ -221,10 +267,17 @@ AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Tr
     }
     u_bar = std::move(u_old_bar);
     s_bar = std::move(s_old_bar);
+    std::vector<signed char> now_on = step_regimes(passes.last(), record.state.u);
+    if (i + 1 < num_steps) result.report.regime_changes.push_back(count_changes(now_on, regimes));
+    regimes = std::move(now_on);
+    state = std::move(old);
   }
+  if (num_steps > 0) result.report.regime_changes.push_back(0);
+  result.checkpoints = states.report();
   // Reports run from the first step to the last.
   for (auto* list : {&result.report.smallest_pivot, &result.report.largest_pivot, &result.report.residual})
     std::reverse(list->begin(), list->end());
+  std::reverse(result.report.regime_changes.begin(), result.report.regime_changes.end());
   result.report.seconds = now() - start;
   return result;
 }

@@ -6,6 +6,9 @@
 //   adjoint  K_i adj = q_u + ū_i + G_uᵀ s̄_i,       θ̄ += −R_θᵀ adj + G_θᵀ s̄_i
 //            ū_{i−1} = −R_{u−}ᵀ adj + G_{u−}ᵀ s̄_i,   s̄_{i−1} = q_s − R_{s−}ᵀ adj + G_{s−}ᵀ s̄_i
 //
+// An output may also depend on the old state and on θ directly (StepOutput); those paths add to the bars at
+// its step.
+//
 // K is the raw Hessian at the converged state. A run that is incomplete, kept no states, has a step that did
 // not converge, lies outside the domain or whose Hessian does not factor is refused (GradientError): the
 // implicit function theorem does not hold there, a number would be wrong.
@@ -20,6 +23,7 @@
 #include <vector>
 
 #include "adjoint/outputs.h"
+#include "adjoint/run_states.h"
 #include "sim/time/simulate.h"
 
 namespace rhytid::adjoint {
@@ -29,11 +33,21 @@ class GradientError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// How near to singular each step was.
+/// How near to singular each step was, and how near to a kink.
 struct SweepReport {
   std::vector<double> smallest_pivot, largest_pivot;  ///< per step, of the raw Hessian's Cholesky factor
   std::vector<double> residual;                       ///< per step |R|, N
+  /// Per step: points of contact and friction that are on another smooth piece of their law than at the end
+  /// of the step before. Where there are many, the gradient holds in a small neighbourhood only.
+  std::vector<long> regime_changes;
   double seconds = 0;
+
+  /// Smallest pivot over the largest, per step, relative to the median over the steps; 0 where there is no
+  /// median.
+  std::vector<double> relative_pivots() const;
+  /// Steps with a relative pivot below `dip`: a bifurcation is near, and the gradient holds in a small
+  /// neighbourhood only.
+  std::vector<int> near_singular_steps(double dip = 0.1) const;
 };
 
 /// Derivatives of every output along native directions. directions [native size][k]; result per frame
@@ -52,8 +66,16 @@ struct AdjointResult {
   /// adjᵀ R summed over steps: the first-order error of the functional from residuals that are not exactly
   /// zero.
   double residual_error = 0;
+  CheckpointReport checkpoints;
 };
 AdjointResult adjoint_sweep(const Model& model, const VectorXd& native, const Trajectory& run,
                             const Output& output, const std::vector<VectorXd>& weights);
+
+/// The same for a run that dropped its histories (RunOptions::keep_histories), holding no more than
+/// `budget_bytes` of states at a time: what does not fit is recomputed, to the same bits (run_states.h).
+/// adjoint_sweep has no such limit.
+AdjointResult adjoint_sweep_within(std::size_t budget_bytes, const Model& model, const VectorXd& native,
+                                   const Trajectory& run, const Output& output,
+                                   const std::vector<VectorXd>& weights);
 
 }  // namespace rhytid::adjoint

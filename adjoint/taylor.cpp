@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "adjoint/output_values.h"
 #include "sim/core/error.h"
 #include "sim/time/step_passes.h"
 
@@ -70,22 +71,19 @@ FunctionalDifference::FunctionalDifference(const SceneModel& scene_model, const 
   require(run.complete, "FunctionalDifference: the run must be complete");
   require(static_cast<int>(weights.size()) == run.frames() + 1,
           "FunctionalDifference: weights for every frame");
-  for (int f = 0; f <= run.frames(); ++f) values_.push_back(output.values(f, run.at_frame(f)));
   const VectorXd native = scene_model.native();
+  values_ = output_values(model(), native, run, output);
   for (int i = 0; i < static_cast<int>(run.steps.size()); ++i) {
     StepPasses passes(model(), native, run.steps[i].step, run.before(i), run.steps[i].earlier_passes);
     regimes_.push_back(step_regimes(passes.last(), run.steps[i].state.u));
   }
 }
 
-double FunctionalDifference::frame_difference(int frame, const State& state) const {
-  if (output_->size(frame) == 0) return 0;
-  return (*weights_)[frame].dot(output_->values(frame, state) - values_[frame]);
-}
-
 double FunctionalDifference::difference(const Trajectory& other) const {
+  const std::vector<VectorXd> values = output_values(model(), scene_model_->native(), other, *output_);
   double sum = 0;
-  for (int f = 0; f <= run_->frames(); ++f) sum += frame_difference(f, other.at_frame(f));
+  for (int f = 0; f <= run_->frames(); ++f)
+    if (output_->size(f) > 0) sum += (*weights_)[f].dot(values[f] - values_[f]);
   return sum;
 }
 
@@ -97,7 +95,9 @@ FunctionalDifference::Result FunctionalDifference::evaluate(const VectorXd& nati
     const std::vector<signed char> now = step_regimes(problem, state.u);
     for (std::size_t q = 0; q < now.size(); ++q) result.switches += now[q] != regimes_[step][q];
     for (; frame <= run_->frames() && run_->frame_end[frame] == step + 1; ++frame)
-      result.difference += frame_difference(frame, state);
+      if (output_->size(frame) > 0)
+        result.difference +=
+            (*weights_)[frame].dot(output_->step_values(frame, problem, state) - values_[frame]);
     return !go_on || go_on();
   };
   const auto nominal = [this](int step, const State&) { return run_->steps[step].state.u; };

@@ -63,7 +63,8 @@ class FunctionalDifference {
   /// Q at other native parameters, warm-started from displacements (null: from the nominal run's own).
   Result evaluate(const VectorXd& native, const StartGuess& guess = {},
                   const std::function<bool()>& go_on = {}) const;
-  /// Q of a trajectory over the same steps that kept its states, relative to the nominal one.
+  /// Q of a trajectory of the scene's own parameters over the same steps that kept its states, relative to
+  /// the nominal one.
   double difference(const Trajectory& other) const;
 
   const Trajectory& run() const { return *run_; }
@@ -72,8 +73,6 @@ class FunctionalDifference {
   const std::vector<std::vector<signed char>>& regimes() const { return regimes_; }
 
  private:
-  double frame_difference(int frame, const State& state) const;
-
   const SceneModel* scene_model_;
   const Trajectory* run_;
   const Output* output_;

@@ -97,4 +97,14 @@ MatrixXd SurfaceSamples::heights(const VectorXd& displacement) const {
   return h;
 }
 
+void SurfaceSamples::add_transpose(const MatrixXd& weights, VectorXd& u_bar) const {
+  require(weights.rows() == rows_ && weights.cols() == columns_, "SurfaceSamples: one weight per point");
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    const Point& point = points_[p];
+    const double weight = weights(static_cast<Eigen::Index>(p) % rows_, static_cast<Eigen::Index>(p) / rows_);
+    for (std::size_t k = 0; k < point.nodes.size(); ++k)
+      u_bar.segment<3>(3 * point.nodes[k]) += (weight * point.weights[k]) * point.normal;
+  }
+}
+
 }  // namespace rhytid

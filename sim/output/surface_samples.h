@@ -38,6 +38,8 @@ class SurfaceSamples {
   /// Displacement along the smoothed rest normals, mm, [rows][columns]; NaN beside the surface.
   /// `displacement` [num_nodes·3].
   MatrixXd heights(const VectorXd& displacement) const;
+  /// The transpose: adds Σ weights · ∂heights/∂u to u_bar [num_nodes·3]; points beside the surface have none.
+  void add_transpose(const MatrixXd& weights, VectorXd& u_bar) const;
 
  private:
   void place(const SkinMesh& mesh, const std::vector<Vec3>& wanted, double nominal_spacing);

@@ -67,6 +67,37 @@ MatrixXd smooth(const MatrixXd& h, double deviation, double spacing) {
   return out;
 }
 
+/// Adds factor times the transpose of `smooth` (of lines: one column) applied to the weights.
+void add_smooth_transpose(const MatrixXd& weights, double deviation, double spacing, double factor,
+                          MatrixXd& out) {
+  const std::vector<double> w = ::rhytid::weights(deviation, spacing);
+  const int nx = static_cast<int>(weights.rows()), ny = static_cast<int>(weights.cols());
+  const int reach = static_cast<int>(w.size()) - 1;
+  for (int y = 0; y < ny; ++y)
+    for (int x = 0; x < nx; ++x) {
+      if (std::isnan(weights(x, y)) || weights(x, y) == 0) continue;
+      const auto for_neighbours = [&](auto&& visit) {
+        for (int j = std::max(0, y - reach); j <= std::min(ny - 1, y + reach); ++j)
+          for (int i = std::max(0, x - reach); i <= std::min(nx - 1, x + reach); ++i)
+            if (!std::isnan(weights(i, j)))
+              visit(i, j, w[std::abs(i - x)] * w[std::abs(j - y)], Vec3(1, i - x, j - y));
+      };
+      Mat3 moments = Mat3::Zero();
+      for_neighbours([&](int, int, double weight, const Vec3& p) { moments += weight * p * p.transpose(); });
+      // Value = fit · Σ weight h p: of a plane, of a straight line when there is but one column, or the mean.
+      Vec3 fit(1 / moments(0, 0), 0, 0);
+      const double s0 = moments(0, 0), det = s0 * moments(1, 1) - moments(1, 0) * moments(1, 0);
+      if (ny == 1) {
+        if (det > 1e-12 * s0 * s0) fit = Vec3(moments(1, 1), -moments(1, 0), 0) / det;
+      } else if (moments.determinant() > 1e-12 * std::pow(s0, 3)) {
+        fit = moments.ldlt().solve(Vec3::UnitX());
+      }
+      const double value = factor * weights(x, y);
+      for_neighbours(
+          [&](int i, int j, double weight, const Vec3& p) { out(i, j) += value * weight * fit.dot(p); });
+    }
+}
+
 /// From the two points on either side, of fourth order: waves of ten points keep their slope within 1 %.
 double derivative(double b2, double b1, double a1, double a2, double spacing) {
   return (8 * (a1 - b1) - (a2 - b2)) / (12 * spacing);
@@ -126,6 +157,43 @@ WrinkleSums wrinkle_sums(const MatrixXd& b, double spacing) {
       sums.gradient += area * slope * slope.transpose();
     }
   return sums;
+}
+
+MatrixXd wrinkle_sums_transpose(const MatrixXd& b, double spacing, const WrinkleSums& bar) {
+  const bool is_line = b.cols() == 1;
+  const double measure = is_line ? spacing : spacing * spacing;
+  MatrixXd out = b.unaryExpr([](double x) { return std::isnan(x) ? x : 0.0; });
+  // The weights of `derivative` over the points −2, −1, 1, 2.
+  constexpr int offsets[] = {-2, -1, 1, 2};
+  const double stencil[] = {1 / (12 * spacing), -8 / (12 * spacing), 8 / (12 * spacing), -1 / (12 * spacing)};
+  const Eigen::Index inset = is_line ? 0 : 2;
+  for (Eigen::Index j = inset; j + inset < b.cols(); ++j)
+    for (Eigen::Index i = 2; i + 2 < b.rows(); ++i) {
+      Eigen::Vector2d slope(derivative(b(i - 2, j), b(i - 1, j), b(i + 1, j), b(i + 2, j), spacing), 0);
+      if (!is_line) slope[1] = derivative(b(i, j - 2), b(i, j - 1), b(i, j + 1), b(i, j + 2), spacing);
+      const double height = b(i, j);
+      if (std::isnan(height) || !slope.allFinite()) continue;
+      out(i, j) += measure * (2 * height * bar.square + 4 * height * height * height * bar.fourth);
+      const Eigen::Vector2d slope_bar = measure * (bar.gradient + bar.gradient.transpose()) * slope;
+      for (int k = 0; k < 4; ++k) {
+        out(i + offsets[k], j) += slope_bar[0] * stencil[k];
+        if (!is_line) out(i, j + offsets[k]) += slope_bar[1] * stencil[k];
+      }
+    }
+  return out;
+}
+
+MatrixXd band_pass_transpose(const MatrixXd& weights, double spacing, const WrinkleBand& band) {
+  band.validate();
+  require(spacing > 0, "band_pass_transpose: the spacing must be positive");
+  MatrixXd out = weights.unaryExpr([](double x) { return std::isnan(x) ? x : 0.0; });
+  if (band.shortest > 0)
+    add_smooth_transpose(weights, half_pass_deviation(band.shortest), spacing, 1, out);
+  else
+    out = weights;
+  if (std::isfinite(band.longest))
+    add_smooth_transpose(weights, half_pass_deviation(band.longest), spacing, -1, out);
+  return out;
 }
 
 WrinkleDescriptors describe(const WrinkleSums& sums) {

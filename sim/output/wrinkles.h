@@ -57,6 +57,13 @@ WrinkleSums wrinkle_sums(const VectorXd& band_passed, double spacing);
 /// Points whose derivatives need one that is not on the surface do not count.
 WrinkleSums wrinkle_sums(const MatrixXd& band_passed, double spacing);
 
+/// Derivative of Σ bar · sums by the band-passed heights, [nx][ny] (one column: a line); NaN beside the
+/// surface.
+MatrixXd wrinkle_sums_transpose(const MatrixXd& band_passed, double spacing, const WrinkleSums& bar);
+/// The transpose of band_pass: from weights of the band-passed heights, NaN beside the surface as there, to
+/// weights of the heights.
+MatrixXd band_pass_transpose(const MatrixXd& weights, double spacing, const WrinkleBand& band);
+
 struct WrinkleDescriptors {
   double amplitude = 0;   ///< mm
   double wavelength = 0;  ///< mm

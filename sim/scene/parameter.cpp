@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <utility>
 
 #include "sim/core/error.h"
@@ -80,6 +79,30 @@ const Kind kinds[] = {
      }},
 };
 
+/// A kind of parameter that is one component of a vector: the pattern names the vector's rule, addresses have
+/// the component's number behind it. The vector is a member of the `count` parts of item i, part k.
+struct VectorKind {
+  const char* pattern;
+  double lower, upper;  ///< `reach` = 0
+  double reach;         ///< else the bounds of a component are its value in the scene ± reach
+  ParameterTransform transform;
+  size_t (*count)(const Scene&, size_t i);
+  Vec3* (*member)(Scene&, size_t i, size_t k);
+};
+
+const VectorKind vector_kinds[] = {
+    // A source at a vertex stays there. Positions are projected to the surface.
+    {"/ligaments/sources/*/position", 0, 0, 10, none,
+     [](const Scene& s, size_t i) { return size_t{s.ligaments->sources[i].vertex ? 0u : 1u}; },
+     [](Scene& s, size_t i, size_t) { return &s.ligaments->sources[i].position; }},
+    // A path that is read from a file has no values in the scene.
+    {"/colliders/*/path/*/position", 0, 0, 5, none,
+     [](const Scene& s, size_t i) {
+       return s.colliders[i].path_file.empty() ? s.colliders[i].path.size() : 0;
+     },
+     [](Scene& s, size_t i, size_t k) { return &s.colliders[i].path[k].position; }},
+};
+
 /// Names of the items that the * of a pattern runs over; a pattern without * has one nameless item.
 std::vector<std::string> item_names(const Scene& scene, std::string_view pattern) {
   std::vector<std::string> names;
@@ -97,13 +120,18 @@ std::vector<std::string> item_names(const Scene& scene, std::string_view pattern
   return names;
 }
 
+/// A parameter of a scene.
 struct Found {
-  const Kind* kind = nullptr;
-  size_t item = 0;
-  std::string address;  ///< by names
+  const char* pattern;  ///< of its rule
+  double lower, upper;
+  ParameterTransform transform;
+  double* value;          ///< in the scene
+  std::string address;    ///< by names
+  std::string by_number;  ///< the same with items of lists by number
   std::string name;
 };
 
+/// The pattern with its first * replaced.
 std::string filled(std::string pattern, const std::string& item) {
   const size_t star = pattern.find('*');
   return star == std::string::npos ? pattern : pattern.replace(star, 1, escape_key(item));
@@ -119,24 +147,51 @@ std::string short_name(const std::string& address, bool has_item) {
   return name;
 }
 
-/// The members are only read through the returned pointers when the scene is const.
-std::vector<Found> find_all(const Scene& scene) {
+void add_components(Scene& scene, const VectorKind& kind, std::vector<Found>& all) {
+  const std::vector<std::string> names = item_names(scene, kind.pattern);
+  for (size_t i = 0; i < names.size(); ++i)
+    for (size_t k = 0; k < kind.count(scene, i); ++k) {
+      Vec3& vector = *kind.member(scene, i, k);
+      const auto place = [&](const std::string& item) {
+        return filled(filled(kind.pattern, item), std::to_string(k));
+      };
+      const std::string address = place(names[i]), by_number = place(std::to_string(i));
+      for (int axis = 0; axis < 3; ++axis) {
+        const double value = vector[axis];
+        const std::string component = "/" + std::to_string(axis);
+        all.push_back({kind.pattern, kind.reach > 0 ? value - kind.reach : kind.lower,
+                       kind.reach > 0 ? value + kind.reach : kind.upper, kind.transform, &vector[axis],
+                       address + component, by_number + component,
+                       short_name(address, true) + " " + "xyz"[axis]});
+      }
+    }
+}
+
+/// All of the scene, in the order of the tables.
+std::vector<Found> find_all(Scene& scene) {
   std::vector<Found> all;
   for (const Kind& kind : kinds) {
     const std::vector<std::string> names = item_names(scene, kind.pattern);
     for (size_t i = 0; i < names.size(); ++i) {
-      if (kind.member(const_cast<Scene&>(scene), i) == nullptr) continue;
+      double* value = kind.member(scene, i);
+      if (value == nullptr) continue;
       const std::string address = filled(kind.pattern, names[i]);
-      all.push_back({&kind, i, address, short_name(address, !names[i].empty())});
+      all.push_back({kind.pattern, kind.lower, kind.upper, kind.transform, value, address,
+                     filled(kind.pattern, std::to_string(i)), short_name(address, !names[i].empty())});
     }
   }
+  for (const VectorKind& kind : vector_kinds) add_components(scene, kind, all);
   return all;
 }
 
+/// The same for reading only.
+std::vector<Found> find_all(const Scene& scene) {
+  return find_all(const_cast<Scene&>(scene));
+}
+
 Found find(const Scene& scene, std::string_view address) {
-  for (const Found& found : find_all(scene))
-    if (found.address == address || filled(found.kind->pattern, std::to_string(found.item)) == address)
-      return found;
+  for (Found& found : find_all(scene))
+    if (found.address == address || found.by_number == address) return std::move(found);
   const std::string file = scene.file.empty() ? "" : scene.file + ": ";
   throw InputError(file + "parameter address", shown_json(std::string(address)),
                    expected_parameter(scene, address));
@@ -154,22 +209,22 @@ const Rule* rule_at(std::string_view address) {
   return node->rule;
 }
 
-ParameterSpec describe(const Scene& scene, const Found& found) {
-  const Dimension dimension = find_rule(found.kind->pattern)->dimension;
+ParameterSpec describe(const Found& found) {
+  const Dimension dimension = find_rule(found.pattern)->dimension;
   return {.address = found.address,
           .name = found.name,
           .unit = unit_text(dimension),
           .dimension = dimension,
-          .lower = found.kind->lower,
-          .upper = found.kind->upper,
-          .transform = found.kind->transform,
-          .value = *found.kind->member(const_cast<Scene&>(scene), found.item)};
+          .lower = found.lower,
+          .upper = found.upper,
+          .transform = found.transform,
+          .value = *found.value};
 }
 
 }  // namespace
 
 ParameterSpec describe_parameter(const Scene& scene, std::string_view address) {
-  return describe(scene, find(scene, address));
+  return describe(find(scene, address));
 }
 
 std::string expected_parameter(const Scene& scene, std::string_view address) {
@@ -195,28 +250,27 @@ std::string expected_parameter(const Scene& scene, std::string_view address) {
 
 std::vector<ParameterSpec> all_parameters(const Scene& scene) {
   std::vector<ParameterSpec> specs;
-  for (const Found& found : find_all(scene)) specs.push_back(describe(scene, found));
+  for (const Found& found : find_all(scene)) specs.push_back(describe(found));
   return specs;
 }
 
 double get_parameter(const Scene& scene, std::string_view address) {
-  const Found found = find(scene, address);
-  return *found.kind->member(const_cast<Scene&>(scene), found.item);
+  return *find(scene, address).value;
 }
 
 void set_parameter(Scene& scene, std::string_view address, double value) {
   const Found found = find(scene, address);
-  const Rule& rule = *find_rule(found.kind->pattern);
+  const Rule& rule = *find_rule(found.pattern);
   if (!std::isfinite(value) || !is_in_range(rule, value)) {
     char text[32];
     std::snprintf(text, sizeof(text), "%.10g", value);
     const std::string file = scene.file.empty() ? "" : scene.file + ": ";
     throw InputError(file + found.address, text, expectation(rule));
   }
-  double& member = *found.kind->member(scene, found.item);
-  const double before = std::exchange(member, value);
-  if (found.kind->member(scene, found.item) != nullptr) return;
-  member = before;  // of this kind 0 is no parameter any more
+  const double before = std::exchange(*found.value, value);
+  for (const Found& still : find_all(scene))
+    if (still.value == found.value) return;
+  *found.value = before;  // of this kind 0 is no parameter any more
   throw InputError((scene.file.empty() ? "" : scene.file + ": ") + found.address, "0", "a number > 0");
 }
 

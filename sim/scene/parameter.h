@@ -3,6 +3,8 @@
 //
 // An address is the JSON pointer of the value in the scene file; items of lists by name or by number:
 //   /skin/layers/film/youngs_modulus   /ligaments/sources/0/strength   /colliders/finger/friction/coefficient
+// Components of a vector by number:
+//   /colliders/finger/path/0/position/2   /ligaments/sources/jaw/position/0
 #pragma once
 
 #include <string>
@@ -23,7 +25,7 @@ struct ParameterSpec {
   std::string name;             ///< short, for tables and legends: "film youngs_modulus"
   std::string unit;             ///< of value, lower and upper: "MPa", "1/mm", "" for plain numbers
   Dimension dimension;          ///< the same as exponents, for parse_quantity and format_quantity
-  double lower = 0, upper = 0;  ///< default bounds of a fit; lie inside the range that a scene may hold
+  double lower = 0, upper = 0;  ///< default bounds of a fit; inside the range that a scene may hold
   ParameterTransform transform = ParameterTransform::none;
   double value = 0;  ///< in the scene
 };
@@ -36,7 +38,7 @@ ParameterSpec describe_parameter(const Scene& scene, std::string_view address);
 /// that the value it addresses is none of those that can be fitted.
 std::string expected_parameter(const Scene& scene, std::string_view address);
 
-/// Every fit-able scalar of the scene, in the order of the file.
+/// Every fit-able scalar of the scene: scalars in the order of the file, then components of vectors.
 std::vector<ParameterSpec> all_parameters(const Scene& scene);
 
 /// Value in internal units (mm, N, MPa, s). Throws InputError as describe_parameter does.

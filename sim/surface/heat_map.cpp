@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "sim/core/error.h"
 #include "sim/core/work_count.h"
@@ -56,8 +57,20 @@ long heat_maps_solved() {
   return maps_solved;
 }
 
-HeatMapWeights diffuse_sources(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
-                               const std::vector<HeatSource>& sources, double time) {
+namespace {
+
+/// G and what it came from.
+struct Diffused {
+  HeatOperator op;
+  MatrixXd theta;
+  double scale;  // both sides of the equation are divided by max(1, t): nothing overflows, whatever the time
+  VectorXd mass;
+  std::unique_ptr<MMatrixFactor> factor;
+  MatrixXd kernel;
+};
+
+Diffused diffuse(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                 const std::vector<HeatSource>& sources, double time, std::vector<int>* unresolved) {
   require(!sources.empty(), "diffuse_sources: at least one source is needed");
   require(time >= 0 && std::isfinite(time), "diffuse_sources: time must be finite and >= 0");
   require(nodes.allFinite(), "diffuse_sources: nodes must be finite");
@@ -66,19 +79,53 @@ HeatMapWeights diffuse_sources(const MatrixX3& nodes, const std::vector<std::arr
     require(std::isfinite(source.radius) && source.radius > 0, "diffuse_sources: radius must be > 0");
   }
   ++maps_solved;
-  const HeatOperator op = assemble_heat_operator(nodes, triangles);
-  HeatMapWeights result;
-  const MatrixXd theta = source_kernels(nodes, op.mass, sources, &result.unresolved_sources);
-
-  // Both sides divided by max(1, t): nothing overflows, whatever the time.
-  const double scale = 1 / std::max(1.0, time);
-  const VectorXd mass = scale * op.mass;
+  Diffused d;
+  d.op = assemble_heat_operator(nodes, triangles);
+  d.theta = source_kernels(nodes, d.op.mass, sources, unresolved);
+  d.scale = 1 / std::max(1.0, time);
+  d.mass = d.scale * d.op.mass;
   std::vector<WeightedEdge> edges;
   if (time > 0)
-    for (const WeightedEdge& e : op.edges)
-      if (const double w = e.weight * (time * scale); w > 0) edges.push_back({e.i, e.j, w});
-  const MMatrixFactor factor(mass, edges);
-  const MatrixXd kernel = factor.solve(mass.asDiagonal() * theta);  // G
+    for (const WeightedEdge& e : d.op.edges)
+      if (const double w = e.weight * (time * d.scale); w > 0) edges.push_back({e.i, e.j, w});
+  d.factor = std::make_unique<MMatrixFactor>(d.mass, edges);
+  d.kernel = d.factor->solve(d.mass.asDiagonal() * d.theta);
+  return d;
+}
+
+}  // namespace
+
+MatrixXd source_motion(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                       const std::vector<HeatSource>& sources, double time, int source) {
+  require(source >= 0 && source < static_cast<int>(sources.size()), "source_motion: no such source");
+  std::vector<int> unresolved;
+  const Diffused d = diffuse(nodes, triangles, sources, time, &unresolved);
+  MatrixXd motion = MatrixXd::Zero(nodes.rows(), 3);
+  if (std::find(unresolved.begin(), unresolved.end(), source) != unresolved.end()) return motion;
+  // θ = q⁴, q = 1 − |x − p|²/h²
+  const HeatSource& moved = sources[static_cast<std::size_t>(source)];
+  for (Eigen::Index i = 0; i < nodes.rows(); ++i) {
+    const Vec3 way = nodes.row(i).transpose() - moved.position;
+    const double h2 = moved.radius * moved.radius, q = 1 - way.squaredNorm() / h2;
+    if (q > 0 && d.mass[i] > 0) motion.row(i) = (4 * q * q * q * 2 / h2) * way.transpose();
+  }
+  motion = d.factor->solve(d.mass.asDiagonal() * motion);
+  for (Eigen::Index i = 0; i < nodes.rows(); ++i) {
+    const double magnitude = d.kernel.row(i).sum();  // φ
+    if (magnitude < kSmallestMagnitude)
+      motion.row(i).setZero();
+    else
+      motion.row(i) /= magnitude;
+  }
+  return motion;
+}
+
+HeatMapWeights diffuse_sources(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                               const std::vector<HeatSource>& sources, double time) {
+  HeatMapWeights result;
+  const Diffused d = diffuse(nodes, triangles, sources, time, &result.unresolved_sources);
+  const auto& [op, theta, scale, mass, held_factor, kernel] = d;
+  const MMatrixFactor& factor = *held_factor;
 
   // Ġ: right-hand side −L G. Outside the source's own kernel L G = −M G / t, which has no cancellation.
   MatrixXd rate = MatrixXd::Zero(kernel.rows(), kernel.cols());

@@ -43,6 +43,14 @@ struct HeatMapWeights {
 HeatMapWeights diffuse_sources(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
                                const std::vector<HeatSource>& sources, double time);
 
+/// How the map moves with a source: D_r / φ, [num_nodes][3], 1/mm, where D_r solves (M + t L) D_r = M ∂θ_r/∂p
+/// for the position p of source r. Then ∂w_s/∂p = (δ_sr − w_s) D_r/φ, and of b = Σ_s w_s b_s
+///   ∂b/∂p = (b_r − b) D_r/φ.
+/// Zero at nodes that no source reaches, and everywhere for an unresolved source (the map then jumps from
+/// node to node). Throws as diffuse_sources does.
+MatrixXd source_motion(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                       const std::vector<HeatSource>& sources, double time, int source);
+
 /// Calls of diffuse_sources since the program began: work that only ligament sources cause.
 long heat_maps_solved();
 

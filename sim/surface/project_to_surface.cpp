@@ -66,4 +66,24 @@ SurfacePoint project_to_surface(const MatrixX3& nodes, const std::vector<std::ar
   return best;
 }
 
+Mat3 projection_derivative(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                           const Vec3& position, const SurfacePoint& at) {
+  constexpr double kRounding = 1e-9;  // of the way to the surface, or of the triangle
+  const std::array<int, 3>& t = triangles[static_cast<std::size_t>(at.triangle)];
+  const auto corner = [&](int k) { return Vec3(nodes.row(t[static_cast<std::size_t>(k)]).transpose()); };
+  const Vec3 u = corner(1) - corner(0), v = corner(2) - corner(0), normal = u.cross(v).normalized();
+  const Vec3 way = position - at.point;
+  // Straight above the face, its edges included: then it is a face's closest point on one side at least.
+  const double sideways = (way - way.dot(normal) * normal).norm();
+  if (sideways <= kRounding * std::max(way.norm(), u.norm()) && normal.allFinite())
+    return Mat3::Identity() - normal * normal.transpose();
+  for (int k = 0; k < 3; ++k) {
+    const int next = (k + 1) % 3, other = (k + 2) % 3;
+    if (at.barycentric[other] > 0 || at.barycentric[k] <= 0 || at.barycentric[next] <= 0) continue;
+    const Vec3 edge = (corner(next) - corner(k)).normalized();
+    return edge * edge.transpose();
+  }
+  return Mat3::Zero();
+}
+
 }  // namespace rhytid

@@ -21,4 +21,9 @@ struct SurfacePoint {
 SurfacePoint project_to_surface(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
                                 const Vec3& position);
 
+/// Derivative of the closest point by the position, where `at` is the closest point to it: on a face I − n
+/// nᵀ, on an edge that sticks out e eᵀ, at a corner 0 (between them it jumps).
+Mat3 projection_derivative(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,
+                           const Vec3& position, const SurfacePoint& at);
+
 }  // namespace rhytid

@@ -212,7 +212,8 @@ struct FrictionLaw {
 
   static constexpr bool history_is_lag = true;
   static constexpr std::array<const char*, 0> stored_names{};
-  void stored(const double*, const double*, const double*, const double*, double*) const {}
+  template <class T>
+  void stored(const T*, const T*, const T*, const double*, T*) const {}
   /// Traction times slip, per area; never negative.
   double dissipated(const double*, const double*, const double* u, const double* prepared, const double*,
                     const double* theta, const double* rest, double dt) const {

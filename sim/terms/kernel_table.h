@@ -34,6 +34,9 @@ struct KernelTable {
   void (*account)(const void* law, const ElementView&, const double* theta_old, const double* u_old,
                   const double* s_old, const double* u, const double* prepared, const double* s_new,
                   TermEnergies* sum) = nullptr;
+  /// Stored energy of an element and its derivatives (PointKernel::stored).
+  double (*stored)(const void* law, const ElementView&, const double* u, const double* s, double* u_bar,
+                   double* s_bar, double* theta_bar) = nullptr;
   int num_stored = 0;
   const char* const* stored_names = nullptr;
   /// The history is nothing but what lags behind the step, so that a step may be solved again with its own
@@ -79,6 +82,9 @@ constexpr KernelTable kernel_table() {
                      const double* so, const double* u, const double* p, const double* s, TermEnergies* sum) {
     K::account(*static_cast<const Law*>(l), v, to, uo, so, u, p, s, *sum);
   };
+  table.stored = [](const void* l, const ElementView& v, const double* u, const double* s, double* ub,
+                    double* sb,
+                    double* tb) { return K::stored(*static_cast<const Law*>(l), v, u, s, ub, sb, tb); };
   table.num_stored = static_cast<int>(K::stored_names.size());
   table.stored_names = K::stored_names.data();
   table.history_is_lag = requires {

@@ -198,15 +198,59 @@ struct PointKernel {
   static_assert(stored_names.size() <= 3);
 
   /// Stored energy density by part. A law without a list of its own stores its energy (np = 0).
-  static void stored(const Law& law, const double* e, const double* s, const double* theta,
-                     const double* rest_point, double dt, double* out) {
+  template <class T>
+  static void stored_parts(const Law& law, const T* e, const T* s, const T* theta, const double* rest_point,
+                           double dt, T* out) {
     if constexpr (requires { Law::stored_names; }) {
-      law.stored(e, s, theta, rest_point, out);
+      law.template stored<T>(e, s, theta, rest_point, out);
     } else {
       static_assert(np == 0);
-      double sigma[ne];
-      out[0] = law.template stress<double>(e, nullptr, theta, rest_point, dt, sigma);
+      T sigma[ne];
+      out[0] = law.template stress<T>(e, nullptr, theta, rest_point, dt, sigma);
     }
+  }
+
+  /// Stored energy, all parts. Unless u_bar is null: adds its derivatives to u_bar [n][3] and writes those to
+  /// s_bar [nq][ns] and theta_bar [nq][nt].
+  static double stored(const Law& law, const ElementView& v, const double* u, const double* s, double* u_bar,
+                       double* s_bar, double* theta_bar) {
+    constexpr int no = ne + ns + nt;
+    double total = 0;
+    if constexpr (!stored_names.empty()) {
+      double natural[3][max_rows], out[3][max_rows];
+      gather<R>(v, u, natural);
+      for (int q = 0; q < v.num_points; ++q) {
+        double z[nz], e[ne];
+        point(v, natural, q, z);
+        Kin::strain(z, e);
+        if (!u_bar) {
+          double parts[3] = {};
+          stored_parts<double>(law, e, s + q * ns, theta(v, q), rest(v, q), v.dt, parts);
+          for (std::size_t k = 0; k < stored_names.size(); ++k) total += v.weight[q] * parts[k];
+          continue;
+        }
+        Dual<no> ed[ne], sd[at_least_one(ns)], td[nt], parts[3];
+        for (int c = 0; c < ne; ++c) ed[c] = Dual<no>::variable(e[c], c);
+        for (int c = 0; c < ns; ++c) sd[c] = Dual<no>::variable(s[q * ns + c], ne + c);
+        for (int c = 0; c < nt; ++c) td[c] = Dual<no>::variable(theta(v, q)[c], ne + ns + c);
+        stored_parts<Dual<no>>(law, ed, sd, td, rest(v, q), v.dt, parts);
+        double bar[no] = {}, b[ne][nz], p[nz];
+        for (std::size_t k = 0; k < stored_names.size(); ++k) {
+          total += v.weight[q] * parts[k].v;
+          for (int i = 0; i < no; ++i) bar[i] += parts[k].d[i];
+        }
+        Kin::strain_gradient(z, b);
+        for (int i = 0; i < nz; ++i) {
+          p[i] = 0;
+          for (int c = 0; c < ne; ++c) p[i] += bar[c] * b[c][i];
+        }
+        put_point(v, p, q, out);
+        for (int c = 0; c < ns; ++c) s_bar[q * ns + c] = v.weight[q] * bar[ne + c];
+        for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] = v.weight[q] * bar[ne + ns + c];
+      }
+      if (u_bar) scatter<R>(v, out, u_bar);
+    }
+    return total;
   }
 
   /// Adds the energies of a converged step. theta_old: the parameters at its start, strided as v.theta.
@@ -229,8 +273,8 @@ struct PointKernel {
       Kin::strain_gradient(z, b);
       for (int c = 0; c < ne; ++c)
         for (int i = 0; i < nz; ++i) sum.force_work += w * sigma[c] * b[c][i] * (z[i] - z_old[i]);
-      stored(law, e_old, so, th_old, r, v.dt, parts_old);
-      stored(law, e, sn, th, r, v.dt, parts);
+      stored_parts<double>(law, e_old, so, th_old, r, v.dt, parts_old);
+      stored_parts<double>(law, e, sn, th, r, v.dt, parts);
       for (std::size_t k = 0; k < stored_names.size(); ++k) {
         sum.stored_before[k] += w * parts_old[k];
         sum.stored[k] += w * parts[k];

@@ -60,12 +60,12 @@ struct PreStretchedLaw {
   }
 
   static constexpr auto stored_names = Base::stored_names;
-  void stored(const double* y, const double* history, const double* theta, const double* rest,
-              double* out) const {
-    double fp[6], yp[6];
+  template <class T>
+  void stored(const T* y, const T* history, const T* theta, const double* rest, T* out) const {
+    T fp[6], yp[6];
     stretch(theta, rest, fp);
     pulled(fp, y, yp);
-    base.stored(yp, history, theta, nullptr, out);
+    base.template stored<T>(yp, history, theta, nullptr, out);
   }
   double dissipated(const double* y_old, const double* history, const double* y, const double* prepared,
                     const double* history_new, const double* theta, const double* rest, double dt) const

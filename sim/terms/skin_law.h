@@ -66,18 +66,20 @@ T equilibrium(const T* y, const T* theta, double volume, T* n) {
 }
 
 /// Stored equilibrium energy by part: distortion (Fung), volume.
-inline void equilibrium_parts(const double* y, const double* theta, double volume, double* out) {
-  double part[3], n[6];
+template <class T>
+void equilibrium_parts(const T* y, const T* theta, double volume, T* out) {
+  T part[3], n[6];
   for (int k = 0; k < 2; ++k) {
     for (int c = 0; c < 3; ++c) part[c] = theta[c];
-    part[k == 0 ? SkinTheta::bulk : SkinTheta::mu_inf] = 0;
+    part[k == 0 ? SkinTheta::bulk : SkinTheta::mu_inf] = T(0.0);
     out[k] = equilibrium(y, part, volume, n);
   }
 }
 
 /// Energy of the Maxwell spring at strain C = I + Y with history C^v = I + V.
-inline double maxwell_energy(const double* y, const double* v, double mu_m) {
-  double l[6], m[6], difference[6], x[6], unused[6];
+template <class T>
+T maxwell_energy(const T* y, const T* v, const T& mu_m) {
+  T l[6], m[6], difference[6], x[6], unused[6];
   cholesky_one_plus(v, l);
   invert_lower(l, m);
   for (int c = 0; c < 6; ++c) difference[c] = y[c] - v[c];
@@ -178,7 +180,8 @@ struct SkinLaw {
   }
 
   static constexpr std::array<const char*, 3> stored_names = {"fung", "volumetric", "maxwell"};
-  void stored(const double* y, const double* history, const double* theta, const double*, double* out) const {
+  template <class T>
+  void stored(const T* y, const T* history, const T* theta, const double*, T* out) const {
     equilibrium_parts(y, theta, volume, out);
     out[2] = maxwell_energy(y, history, theta[SkinTheta::mu_m]);
   }
@@ -220,7 +223,8 @@ struct ElasticSkinLaw {
   void update(const T*, const T*, const T*, const double*, double, T*) const {}
 
   static constexpr std::array<const char*, 2> stored_names = {"fung", "volumetric"};
-  void stored(const double* y, const double*, const double* theta, const double*, double* out) const {
+  template <class T>
+  void stored(const T* y, const T*, const T* theta, const double*, T* out) const {
     equilibrium_parts(y, theta, volume, out);
   }
 };

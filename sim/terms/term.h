@@ -133,6 +133,10 @@ class Term {
   TermEnergies energies(const StepInfo& step, const TermStepData& data, const VectorXd& native,
                         const VectorXd& u_old, const double* s_old, const VectorXd& u,
                         const double* s_new) const;
+  /// Energy [mJ] stored at the end of a step that led to u and the history slice s, all parts of the law.
+  /// Unless u_bar is null: adds its derivatives by displacement, history slice and native parameters.
+  double stored(const StepInfo& step, const TermStepData& data, const VectorXd& u, const double* s,
+                VectorXd* u_bar = nullptr, double* s_bar = nullptr, VectorXd* native_bar = nullptr) const;
   /// Largest s ≤ 1 with det(F + s dF) > 0 everywhere; +inf when the whole step is free.
   double feasible_step(const VectorXd& u, const VectorXd& d) const;
   /// Smallest J = det F over the points (prisms; +inf for surface terms).

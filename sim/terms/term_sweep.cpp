@@ -84,4 +84,31 @@ void Term::adjoint_step(const StepInfo& step, const TermStepData& data, const Ve
   add_theta_transpose(step, theta_bar, native_bar);
 }
 
+double Term::stored(const StepInfo& step, const TermStepData& data, const VectorXd& u, const double* s,
+                    VectorXd* u_bar, double* s_bar, VectorXd* native_bar) const {
+  if (kernels_->num_stored == 0) return 0;
+  ++(u_bar ? counters_.adjoint : counters_.energy);
+  const std::size_t points = static_cast<std::size_t>(num_points_);
+  std::vector<double> ds(u_bar ? points * kernels_->ns : 0), dtheta(u_bar ? points * kernels_->ntheta : 0);
+  double total = 0;
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
+    std::vector<double> energies(groups_[gi].num_elements);
+    std::optional<ElementVectors> forces;
+    if (u_bar) forces.emplace(groups_[gi], 3);
+    for_elements(*this, gi, step, data, [&](const TermElement& e) {
+      energies[e.index] =
+          kernels_->stored(law_.get(), e.view, e.gather(u).data(), s + e.point * kernels_->ns,
+                           forces ? forces->of(e) : nullptr, ds.data() + e.point * kernels_->ns,
+                           dtheta.data() + e.point * kernels_->ntheta);
+    });
+    for (const double energy : energies) total += energy;
+    if (u_bar) forces->add_to(u_bar->data());
+  }
+  if (u_bar) {
+    for (std::size_t k = 0; k < ds.size(); ++k) s_bar[k] += ds[k];
+    add_theta_transpose(step, dtheta, *native_bar);
+  }
+  return total;
+}
+
 }  // namespace rhytid

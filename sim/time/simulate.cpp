@@ -118,7 +118,10 @@ class Runner {
       if (observer_.step) observer_.step({solver_.problem(), next, record, frame_done});
       current_ = std::move(next);
       if (options_.keep_states) {
-        record.state = current_;
+        if (options_.keep_histories)
+          record.state = current_;
+        else
+          record.state = {current_.time, current_.u, {}, {}};
         record.earlier_passes = solver_.earlier_passes();
       }
       run_.steps.push_back(std::move(record));

@@ -23,7 +23,10 @@ struct RunOptions {
   int lag_passes = 1;      ///< solves per step over the lag of friction (step_passes.h)
   int max_bisections = 4;  ///< a step that fails is halved at most this often
   MinimiserOptions minimiser;
-  bool keep_states = true;        ///< keep every step's state in the trajectory (needed for gradients)
+  bool keep_states = true;  ///< keep every step's state in the trajectory (needed for gradients)
+  /// With keep_states: keep their histories too. Without, a state is its displacement alone, a small part of
+  /// its memory; sweeps recompute the history from it (adjoint/run_states.h).
+  bool keep_histories = true;
   bool account_energies = false;  ///< fill StepRecord::energies (costs about one evaluation per step)
   void validate() const;          ///< throws ContractError naming the field
 };
@@ -37,7 +40,7 @@ struct StepRecord {
   int frame = 0;           ///< frame the step leads to (frame 0 is rest: only the settling step leads there)
   int bisections = 0;      ///< how often the nominal step was halved
   bool softened = false;   ///< its start came from softened penalties (the equations solved are the scene's)
-  State state;             ///< after the step (empty when states are not kept)
+  State state;             ///< after the step (empty when states are not kept; without history, see options)
   MinimiserReport report;  ///< of the last pass, with the counts of all, and the work of attempts given up
   /// How far the last pass moved the skin, largest displacement, mm: what is left of the fixed-point iteration
   /// over the lag of friction. 0 with one pass.

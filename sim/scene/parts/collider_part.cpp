@@ -1,5 +1,7 @@
 #include "sim/scene/parts/collider_part.h"
 
+#include <cstdio>
+
 #include "sim/core/error.h"
 #include "sim/scene/collider_motion.h"
 #include "sim/terms/contact_law.h"
@@ -113,6 +115,12 @@ bool ColliderPart::add_derivative(const Scene& scene, const Model& model, const 
   for (const ColliderScene& c : scene.colliders) {
     const std::string key = key_after(address, "colliders", c.name);
     const int slot = key == "stiffness" ? 0 : key == "radius" ? 1 : key == "friction/coefficient" ? 2 : -1;
+    int knot = 0, axis = 0, end = 0;
+    if (std::sscanf(key.c_str(), "path/%d/position/%d%n", &knot, &axis, &end) == 2 &&
+        end == static_cast<int>(key.size())) {
+      d[model.native_block("collider/" + c.name).offset + 3 + 3 * knot + axis] = 1;
+      return true;
+    }
     if (slot < 0) continue;
     d[model.native_block("collider/" + c.name).offset + slot] = 1;
     return true;

@@ -63,6 +63,7 @@ double skin_thickness(const Scene& scene, const SkinMesh& mesh) {
 struct LigamentPart::HeatCache {
   struct Entry {
     double time;
+    std::vector<Vec3> positions;
     std::shared_ptr<const HeatMapWeights> weights;
   };
   std::mutex mutex;
@@ -85,6 +86,7 @@ LigamentPart::LigamentPart(const Scene& scene, const SkinMesh& mesh)
     }
     source_positions_.push_back(project_to_surface(inner_, column_triangles_, position).point);
     heat_sources_.push_back({source_positions_.back(), s.radius});
+    built_positions_.push_back(s.position);
   }
   if (!scene.ligaments->b_by_vertex.empty())
     given_map_ = interpolate_vertices(mesh, on_surface_vertices(mesh.surface, scene.ligaments->b_by_vertex,
@@ -115,16 +117,32 @@ void LigamentPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
                       {static_cast<int>(model.terms.size()) - 1}});
 }
 
-std::shared_ptr<const HeatMapWeights> LigamentPart::heat(double time) const {
+std::vector<HeatSource> LigamentPart::sources_of(const Scene& scene) const {
+  std::vector<HeatSource> sources = heat_sources_;
+  for (std::size_t s = 0; s < sources.size(); ++s) {
+    const SourceScene& now = scene.ligaments->sources[s];
+    if (!now.vertex && now.position != built_positions_[s])
+      sources[s].position = project_to_surface(inner_, column_triangles_, now.position).point;
+  }
+  return sources;
+}
+
+std::shared_ptr<const HeatMapWeights> LigamentPart::heat(const Scene& scene) const {
+  const double time = scene.ligaments->diffusion_time;
+  const std::vector<HeatSource> sources = sources_of(scene);
+  std::vector<Vec3> positions;
+  for (const HeatSource& source : sources) positions.push_back(source.position);
   const std::lock_guard lock(heat_cache_->mutex);
   auto& entries = heat_cache_->entries;
-  const auto it =
-      std::find_if(entries.begin(), entries.end(), [&](const auto& entry) { return entry.time == time; });
+  const auto it = std::find_if(entries.begin(), entries.end(), [&](const auto& entry) {
+    return entry.time == time && entry.positions == positions;
+  });
   if (it != entries.end()) {
     entries.splice(entries.begin(), entries, it);
   } else {
-    entries.push_front({time, std::make_shared<const HeatMapWeights>(
-                                  diffuse_sources(inner_, column_triangles_, heat_sources_, time))});
+    entries.push_front(
+        {time, std::move(positions),
+         std::make_shared<const HeatMapWeights>(diffuse_sources(inner_, column_triangles_, sources, time))});
     ++heat_cache_->solved;
     if (entries.size() > kHeatMapsKept) entries.pop_back();
   }
@@ -154,7 +172,7 @@ VectorXd LigamentPart::map(const Scene& scene) const {
   if (given_map_.size() > 0) return scene.ligaments->map_scale * given_map_;
   VectorXd strengths(scene.ligaments->sources.size());
   for (Eigen::Index s = 0; s < strengths.size(); ++s) strengths[s] = scene.ligaments->sources[s].strength;
-  return heat(scene.ligaments->diffusion_time)->weights * strengths;
+  return heat(scene)->weights * strengths;
 }
 
 void LigamentPart::set_native(const Scene& scene, const Model& model, VectorXd& native) const {
@@ -179,16 +197,29 @@ bool LigamentPart::add_derivative(const Scene& scene, const Model& model, const 
   }
   const std::vector<SourceScene>& sources = scene.ligaments->sources;
   if (address == "/ligaments/diffusion_time") {
-    const auto weights = heat(scene.ligaments->diffusion_time);
+    const auto weights = heat(scene);
     for (std::size_t s = 0; s < sources.size(); ++s)
       d.segment(b.offset, b.size) += weights->d_weights_d_time.col(s) * sources[s].strength;
     return true;
   }
-  for (std::size_t s = 0; s < sources.size(); ++s)
-    if (key_after(address, "ligaments/sources", sources[s].name) == "strength") {
-      d.segment(b.offset, b.size) = heat(scene.ligaments->diffusion_time)->weights.col(s);
+  for (std::size_t s = 0; s < sources.size(); ++s) {
+    const std::string key = key_after(address, "ligaments/sources", sources[s].name);
+    if (key == "strength") {
+      d.segment(b.offset, b.size) = heat(scene)->weights.col(s);
       return true;
     }
+    if (key.starts_with("position/")) {
+      const Vec3& x = sources[s].position;
+      const Mat3 projection = projection_derivative(inner_, column_triangles_, x,
+                                                    project_to_surface(inner_, column_triangles_, x));
+      const MatrixXd motion = source_motion(inner_, column_triangles_, sources_of(scene),
+                                            scene.ligaments->diffusion_time, static_cast<int>(s));
+      const int axis = std::stoi(key.substr(key.size() - 1));
+      d.segment(b.offset, b.size) =
+          (sources[s].strength - map(scene).array()).matrix().cwiseProduct(motion * projection.col(axis));
+      return true;
+    }
+  }
   return false;
 }
 

@@ -25,14 +25,15 @@ class LigamentPart final : public ScenePart {
 
   /// b per column, 1/mm.
   VectorXd map(const Scene& scene) const;
-  /// Where each source sits on the inner surface, mm, after projection.
+  /// Where each source of the scene it was built from sits on the inner surface, mm, after projection.
   const std::vector<Vec3>& source_positions() const { return source_positions_; }
   /// Triangles of the P1 refinement through all columns.
   const std::vector<std::array<int, 3>>& column_triangles() const { return column_triangles_; }
 
-  /// Diffused weights for a diffusion time, mm². Safe from several threads; the last kHeatMapsKept are kept
-  /// (a line search returns to the ones before it), and a returned map lives as long as its holder.
-  std::shared_ptr<const HeatMapWeights> heat(double time) const;
+  /// Diffused weights for the diffusion time (mm²) and source positions of a scene. Safe from several
+  /// threads; the last kHeatMapsKept are kept (a line search returns to the ones before it), and a returned
+  /// map lives as long as its holder.
+  std::shared_ptr<const HeatMapWeights> heat(const Scene& scene) const;
   /// How many maps are kept now.
   std::size_t heat_maps_kept() const;
   static constexpr std::size_t kHeatMapsKept = 4;
@@ -43,11 +44,14 @@ class LigamentPart final : public ScenePart {
 
  private:
   struct HeatCache;
+  /// The sources where the scene has them; one whose position is as built is where it was placed.
+  std::vector<HeatSource> sources_of(const Scene& scene) const;
 
   MatrixX3 inner_;
   std::vector<std::array<int, 3>> column_triangles_;
   std::vector<Vec3> source_positions_;
   std::vector<HeatSource> heat_sources_;
+  std::vector<Vec3> built_positions_;  ///< before projection
   std::shared_ptr<HeatCache> heat_cache_;
   VectorXd given_map_;  ///< b per column before its factor, when the scene gives a map; else empty
 };

@@ -44,11 +44,21 @@ TEST(Parameter, DescribesByNameAndByNumber) {
             "finger friction coefficient");
   EXPECT_EQ(describe_parameter(scene, "/skin/layers/soft/poissons_ratio").transform,
             ParameterTransform::logit);
+  const ParameterSpec knot = describe_parameter(scene, "/colliders/0/path/1/position/2");
+  EXPECT_EQ(knot.address, "/colliders/finger/path/1/position/2");
+  EXPECT_EQ(knot.name, "finger path 1 position z");
+  EXPECT_EQ(knot.unit, "mm");
+  EXPECT_EQ(knot.transform, ParameterTransform::none);
+  EXPECT_EQ(knot.value, 7);
+  EXPECT_EQ(knot.lower, 2);
+  EXPECT_EQ(knot.upper, 12);
+  EXPECT_EQ(describe_parameter(scene, "/ligaments/sources/cheek/position/2").value, 3);
 }
 
-// 2 layers x 5, ligaments 2 + 2 sources, base, finger 3, table 1 (a plane without friction has no radius).
+// 2 layers x 5, ligaments 2 + 2 sources, base, finger 3, table 1 (a plane without friction has no radius);
+// components of a source's position (the other one is at a vertex), of two knots and of one.
 TEST(Parameter, ListsAllOfTheScene) {
-  EXPECT_EQ(all_parameters(full()).size(), 2 * 5 + 2 + 2 + 1 + 3 + 1u);
+  EXPECT_EQ(all_parameters(full()).size(), 2 * 5 + 2 + 2 + 1 + 3 + 1 + 3 * (1 + 2 + 1u));
   EXPECT_EQ(all_parameters(parse_scene_text(testing::minimal_scene, "m.json")).size(), 5u);
 }
 
@@ -92,8 +102,10 @@ TEST(Parameter, RefusesUnknownAddressesAndValues) {
             "nearest "
             "is /skin/layers/film/youngs_modulus; 'rhytid check SCENE --parameters' lists them");
   // Integers, what this scene does not have, and what is not fit-able.
-  for (const char* address : {"", "/colliders/table/radius", "/colliders/table/friction/coefficient",
-                              "/skin/layers/2/stiffening", "/base/stiffness/x"})
+  for (const char* address :
+       {"", "/colliders/table/radius", "/colliders/table/friction/coefficient", "/skin/layers/2/stiffening",
+        "/base/stiffness/x", "/ligaments/sources/jaw/position/0", "/colliders/finger/path/2/position/0",
+        "/colliders/finger/path/1/position/3"})
     EXPECT_THAT(error_of([&] { get_parameter(scene, address); }), ::testing::HasSubstr("nearest is /"))
         << address;
   for (const char* address : {"/skin/order", "/skin/layers/soft/thickness", "/skin/layers/0/thickness"})
