@@ -31,7 +31,9 @@ bool is_friction(const Term& term) {
 }
 
 double largest_penetration(const Term& term, const TermStepData& data, const VectorXd& u) {
-  const ImplicitShape& shape = *term.law<ContactLaw>().shape;
+  const bool is_ellipsoid = &term.kernels() == &ellipsoid_contact_kernels();
+  const ImplicitShape& shape =
+      is_ellipsoid ? *term.law<EllipsoidContactLaw>().shape : *term.law<ContactLaw>().shape;
   double deepest = 0;
   for (std::size_t gi = 0; gi < term.groups().size(); ++gi) {
     const TermGroup& g = term.groups()[gi];
@@ -46,7 +48,11 @@ double largest_penetration(const Term& term, const TermStepData& data, const Vec
         for (int i = 0; i < g.num_nodes; ++i)
           x += g.node_by_row[static_cast<std::size_t>(q) * g.padded_nodes + i] *
                u.segment<3>(3 * g.nodes[static_cast<std::size_t>(e) * g.num_nodes + i]);
-        const GapJet jet = shape.evaluate(rotation.transpose() * (x - centre));
+        const Vec3 place = rotation.transpose() * (x - centre);
+        SizeDerivatives unused;
+        const GapJet jet = is_ellipsoid
+                               ? shape.evaluate_sized(place, Vec3(theta[9], theta[10], theta[11]), unused)
+                               : shape.evaluate(place);
         if (jet.supported) deepest = std::max(deepest, theta[1] + rest[3] - jet.gap);
       }
   }

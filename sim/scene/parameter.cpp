@@ -95,6 +95,9 @@ const VectorKind vector_kinds[] = {
     {"/ligaments/sources/*/position", 0, 0, 10, none,
      [](const Scene& s, size_t i) { return size_t{s.ligaments->sources[i].vertex ? 0u : 1u}; },
      [](Scene& s, size_t i, size_t) { return &s.ligaments->sources[i].position; }},
+    {"/colliders/*/semi_axes", 0.1, 100, 0, log,
+     [](const Scene& s, size_t i) { return size_t{s.colliders[i].shape == ShapeKind::ellipsoid ? 1u : 0u}; },
+     [](Scene& s, size_t i, size_t) { return &s.colliders[i].semi_axes; }},
     // A path that is read from a file has no values in the scene.
     {"/colliders/*/path/*/position", 0, 0, 5, none,
      [](const Scene& s, size_t i) {

@@ -4,7 +4,7 @@
 // An address is the JSON pointer of the value in the scene file; items of lists by name or by number:
 //   /skin/layers/film/youngs_modulus   /ligaments/sources/0/strength   /colliders/finger/friction/coefficient
 // Components of a vector by number:
-//   /colliders/finger/path/0/position/2   /ligaments/sources/jaw/position/0
+//   /colliders/finger/path/0/position/2   /ligaments/sources/jaw/position/0   /colliders/finger/semi_axes/1
 #pragma once
 
 #include <string>

@@ -16,6 +16,12 @@ struct GapJet {
   bool supported = true;         ///< false: outside the support of an IMLS surface; the other fields are zero
 };
 
+/// Derivatives of gap and gradient by the sizes of a shape that has three (ellipsoid: its semi-axes).
+struct SizeDerivatives {
+  Vec3 gap = Vec3::Zero();       ///< ∂g/∂size_k
+  Mat3 gradient = Mat3::Zero();  ///< ∂²g/∂x_i ∂size_k, 1/mm
+};
+
 /// A rigid surface given by a gap function. Immutable, safe to share between threads.
 class ImplicitShape {
  public:
@@ -25,6 +31,9 @@ class ImplicitShape {
   /// ∂g/∂R for a shape whose size is one radius R; 0 for a shape without one. It does not depend on x, so
   /// ∂(∇g)/∂R = 0: changing the radius only offsets the level sets (sphere, capsule).
   virtual double gap_by_radius() const { return 0; }
+  /// Jet at x of the same shape with other sizes (mm, > 0), and derivatives by them. Throws ContractError for
+  /// a shape without sizes.
+  virtual GapJet evaluate_sized(const Vec3& x, const Vec3& sizes, SizeDerivatives& by_size) const;
   /// For a point where evaluate() has no support: is it on the body's side, i.e. hopelessly deep? (The
   /// contact law makes such a trial state infeasible instead of letting the skin fall through.)
   virtual bool behind(const Vec3&) const { return false; }

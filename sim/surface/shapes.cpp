@@ -7,6 +7,10 @@
 
 namespace rhytid {
 
+GapJet ImplicitShape::evaluate_sized(const Vec3&, const Vec3&, SizeDerivatives&) const {
+  throw ContractError("ImplicitShape: this shape has no sizes to change");
+}
+
 Sphere::Sphere(double radius, Side skin_side)
     : radius_(radius), sign_(skin_side == Side::outside ? 1.0 : -1.0) {
   require(std::isfinite(radius) && radius > 0, "Sphere: radius must be finite and positive");

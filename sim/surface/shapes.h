@@ -6,6 +6,7 @@
 //            ∇²g = (I − n nᵀ − a aᵀ)/|x − s|, around its ends that of a sphere.
 // Ellipsoid  g = ±|x − y|, y the point of Σ y²ᵢ/e²ᵢ = 1 nearest to x: yᵢ = e²ᵢ xᵢ/(t + e²ᵢ), t the largest
 //            root of Σ (eᵢ xᵢ/(t + e²ᵢ))² = 1.  n ∝ yᵢ/e²ᵢ;  ∇²g = W (I + g W)⁻¹, W the curvature at y.
+//            ∂g/∂e_k = −n_k y_k/e_k: the surface moves by n · ∂y/∂e_k along its normal.
 //
 // The distance, and not a cheaper implicit function with unit slope at the surface only: penetration then has
 // the same meaning (mm along the normal) on every shape, so that κ and the onset do too, and R is an offset.
@@ -74,18 +75,17 @@ class Capsule final : public ImplicitShape {
 /// Solid ellipsoid around the origin of its frame, semi-axes along the axes of the frame.
 class Ellipsoid final : public ImplicitShape {
  public:
-  /// Semi-axes in mm; throws ContractError unless they are positive and no longer than 1000 times the
-  /// shortest.
+  /// Beyond, the nearest point loses more digits than a position of skin has to spare.
+  static constexpr double largest_ratio = 1000;
+  /// Semi-axes in mm; throws ContractError unless they are positive and no longer than largest_ratio times
+  /// the shortest.
   explicit Ellipsoid(const Vec3& semi_axes);
   GapJet evaluate(const Vec3& x) const override;
+  GapJet evaluate_sized(const Vec3& x, const Vec3& semi_axes, SizeDerivatives& by_size) const override;
   const Vec3& semi_axes() const { return semi_axes_; }
 
  private:
-  /// Nearest point to x of the surface, in the octant of x; `multiplier` is t in x − y = t y/e².
-  Vec3 nearest_point(const Vec3& x, double& multiplier) const;
-
   Vec3 semi_axes_;
-  int shortest_;
 };
 
 }  // namespace rhytid

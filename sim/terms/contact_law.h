@@ -17,7 +17,8 @@
 //          base, friction on the displacement of the step (the velocity form as printed is 1/dt too strong).
 // Units    κ [MPa/mm], ε [mm], f_n [MPa], x = X + u, c [mm], ε_v [mm/s].
 // Shapes   contact θ = κ, inflation, c [3], q [4]; friction θ = κ, inflation, μ, c [3], c_old [3], q [4],
-//          q_old [4]; lag = f_n, n [3]; rest = X [3], g₀. R from the quaternion q (body_frame.h).
+//          q_old [4]; of an ellipsoid then its semi-axes [3]; lag = f_n, n [3]; rest = X [3], g₀. R from the
+//          quaternion q (body_frame.h).
 // Smooth   contact C² (ε > 0) or C¹; friction C² (quintic) or C¹ (quadratic).
 // Tests    tests/sim/terms/law_edges_test.cpp, law_properties_test.cpp, rotating_contact_test.cpp
 #pragma once
@@ -42,15 +43,21 @@ struct LiftedGap {
   bool inside;  ///< unsupported only: behind the nearest sample, i.e. hopelessly deep
 };
 
-/// Gap at X + u of a shape at c with orientation q.
-template <class T>
-LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* u, const double* rest, const T* c, const T* q) {
+/// Gap at X + u of a shape at c with orientation q; `size` [sizes]: of a shape that has three.
+template <int sizes, class T>
+LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* u, const double* rest, const T* c, const T* q,
+                      const T* size) {
   const Rotation<T> rotation(q);
   const T world[3] = {u[0] + rest[0] - c[0], u[1] + rest[1] - c[1], u[2] + rest[2] - c[2]};
   T x[3], gradient[3];
   rotation.to_local(world, x);
   const Vec3 x0(value_of(x[0]), value_of(x[1]), value_of(x[2]));
-  const GapJet jet = shape.evaluate(x0);
+  GapJet jet;
+  SizeDerivatives by_size;
+  if constexpr (sizes > 0)
+    jet = shape.evaluate_sized(x0, Vec3(value_of(size[0]), value_of(size[1]), value_of(size[2])), by_size);
+  else
+    jet = shape.evaluate(x0);
   LiftedGap<T> r;
   r.supported = jet.supported;
   r.inside = !jet.supported && shape.behind(x0);
@@ -59,12 +66,19 @@ LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* u, const double* rest
   for (int i = 0; i < 3; ++i)
     gradient[i] = T(jet.gradient[i]) + dx[0] * jet.hessian(i, 0) + dx[1] * jet.hessian(i, 1) +
                   dx[2] * jet.hessian(i, 2);
+  for (int k = 0; k < sizes; ++k) {
+    const T change = size[k] - value_of(size[k]);
+    r.gap += change * by_size.gap[k];
+    for (int i = 0; i < 3; ++i) gradient[i] += change * by_size.gradient(i, k);
+  }
   rotation.to_world(gradient, r.gradient);
   return r;
 }
 
-struct ContactLaw {
-  static constexpr int ne = 3, ns = 0, np = 0, ntheta = 9, nrest = 4;
+/// `sizes` 0: the shape is what it is. 3: its sizes are the last parameters.
+template <int sizes>
+struct SizedContactLaw {
+  static constexpr int ne = 3, ns = 0, np = 0, ntheta = 9 + sizes, nrest = 4;
   static constexpr const char* name = "contact";
   const ImplicitShape* shape = nullptr;
   double onset = 1e-3;  ///< ε, mm; 0 = C¹ penalty as printed
@@ -87,7 +101,7 @@ struct ContactLaw {
   template <class T>
   T stress(const T* u, const T*, const T* theta, const double* rest, double, T* traction) const {
     for (int i = 0; i < 3; ++i) traction[i] = T(0.0);
-    const LiftedGap<T> g = lift_gap(*shape, u, rest, theta + 2, theta + 5);
+    const LiftedGap<T> g = lift_gap<sizes>(*shape, u, rest, theta + 2, theta + 5, theta + 9);
     if (!g.supported) return T(g.inside ? std::numeric_limits<double>::infinity() : 0.0);
     const T depth = theta[1] + rest[3] - g.gap;
     if (!(value_of(depth) > 0)) return T(0.0);
@@ -104,9 +118,9 @@ struct ContactLaw {
   /// their change.
   double body_work(const double* u_old, const double* u, const double*, const double* theta_old,
                    const double* theta, const double* rest, double dt) const {
-    Dual<1> at_old[9], at_new[9], x_old[3], x[3], unused[3];
+    Dual<1> at_old[ntheta], at_new[ntheta], x_old[3], x[3], unused[3];
     bool moves = false;
-    for (int k = 0; k < 9; ++k) {
+    for (int k = 0; k < ntheta; ++k) {
       at_old[k] = theta_old[k];
       at_new[k] = theta[k];
       at_old[k].d[0] = at_new[k].d[0] = theta[k] - theta_old[k];
@@ -117,23 +131,27 @@ struct ContactLaw {
       x_old[i] = u_old[i];
       x[i] = u[i];
     }
-    return 0.5 * (stress<Dual<1>>(x_old, nullptr, at_old, rest, dt, unused).d[0] +
-                  stress<Dual<1>>(x, nullptr, at_new, rest, dt, unused).d[0]);
+    return 0.5 * (this->template stress<Dual<1>>(x_old, nullptr, at_old, rest, dt, unused).d[0] +
+                  this->template stress<Dual<1>>(x, nullptr, at_new, rest, dt, unused).d[0]);
   }
 
   static constexpr std::array<const char*, 3> regime_names = {"apart", "onset", "pressed"};
   signed char regime(const double* u, const double*, const double* theta, const double* rest, double) const {
-    const LiftedGap<double> g = lift_gap(*shape, u, rest, theta + 2, theta + 5);
+    const LiftedGap<double> g = lift_gap<sizes>(*shape, u, rest, theta + 2, theta + 5, theta + 9);
     const double depth = theta[1] + rest[3] - g.gap;
     if (!g.supported || !(depth > 0)) return 0;
     return depth < onset ? 1 : 2;
   }
 };
 
+using ContactLaw = SizedContactLaw<0>;
+using EllipsoidContactLaw = SizedContactLaw<3>;
+
 enum class Mollifier { quintic, quadratic };
 
-struct FrictionLaw {
-  static constexpr int ne = 3, ns = 4, np = 7, ntheta = 17, nrest = 4;
+template <int sizes>
+struct SizedFrictionLaw {
+  static constexpr int ne = 3, ns = 4, np = 7, ntheta = 17 + sizes, nrest = 4;
   static constexpr const char* name = "friction";
   const ImplicitShape* shape = nullptr;
   double onset = 1e-3;    ///< mm, as in the contact it belongs to
@@ -197,7 +215,7 @@ struct FrictionLaw {
   void update(const T* u, const T*, const T* theta, const double* rest, double, T* lag) const {
     using std::sqrt;
     for (int i = 0; i < 4; ++i) lag[i] = T(i == 3 ? 1.0 : 0.0);
-    const LiftedGap<T> g = lift_gap(*shape, u, rest, theta + 3, theta + 9);
+    const LiftedGap<T> g = lift_gap<sizes>(*shape, u, rest, theta + 3, theta + 9, theta + 17);
     if (!g.supported) return;
     const T depth = theta[1] + rest[3] - g.gap;
     if (!(value_of(depth) > 0)) return;
@@ -240,6 +258,9 @@ struct FrictionLaw {
     return slip_of(u, prepared, theta, rest, slip) < eps * eps ? 1 : 2;
   }
 };
+
+using FrictionLaw = SizedFrictionLaw<0>;
+using EllipsoidFrictionLaw = SizedFrictionLaw<3>;
 
 }  // namespace RHYTID_ISA
 }  // namespace rhytid

@@ -115,5 +115,8 @@ const KernelTable& ligament_kernels();
 const KernelTable& fung_ligament_kernels();
 const KernelTable& contact_kernels();
 const KernelTable& friction_kernels();
+/// The same for EllipsoidContactLaw and EllipsoidFrictionLaw.
+const KernelTable& ellipsoid_contact_kernels();
+const KernelTable& ellipsoid_friction_kernels();
 
 }  // namespace rhytid

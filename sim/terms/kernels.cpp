@@ -75,4 +75,13 @@ const KernelTable& friction_kernels() {
   return table;
 }
 
+const KernelTable& ellipsoid_contact_kernels() {
+  static constexpr KernelTable table = kernel_table<EllipsoidContactLaw, SurfaceKinematics>();
+  return table;
+}
+const KernelTable& ellipsoid_friction_kernels() {
+  static constexpr KernelTable table = kernel_table<EllipsoidFrictionLaw, SurfaceKinematics>();
+  return table;
+}
+
 }  // namespace rhytid

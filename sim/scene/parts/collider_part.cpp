@@ -4,6 +4,7 @@
 
 #include "sim/core/error.h"
 #include "sim/scene/collider_motion.h"
+#include "sim/surface/shapes.h"
 #include "sim/terms/contact_law.h"
 #include "sim/terms/geometry.h"
 
@@ -17,6 +18,31 @@ bool has_friction(const ColliderScene& c) {
 
 int first_orientation(const ColliderScene& c) {
   return 3 + 3 * static_cast<int>(c.path.size());
+}
+
+/// Of the semi-axes in the block, behind the orientations.
+int first_size(const ColliderScene& c, const ColliderMotion& motion) {
+  return first_orientation(c) + 4 * static_cast<int>(motion.quaternions().size());
+}
+
+int num_sizes(const ColliderScene& c) {
+  return c.shape == ShapeKind::ellipsoid ? 3 : 0;
+}
+
+Term contact_term(const ColliderScene& c, const ImplicitShape* shape) {
+  const std::string name = "contact " + c.name;
+  if (num_sizes(c) > 0) return {name, ellipsoid_contact_kernels(), EllipsoidContactLaw{shape, c.onset}};
+  return {name, contact_kernels(), ContactLaw{shape, c.onset}};
+}
+
+Term friction_term(const ColliderScene& c, const ImplicitShape* shape) {
+  const std::string name = "friction " + c.name;
+  const double speed = c.friction->slip_speed;
+  const Mollifier mollifier =
+      c.friction->mollifier == "quadratic" ? Mollifier::quadratic : Mollifier::quintic;
+  if (num_sizes(c) > 0)
+    return {name, ellipsoid_friction_kernels(), EllipsoidFrictionLaw{shape, c.onset, speed, mollifier}};
+  return {name, friction_kernels(), FrictionLaw{shape, c.onset, speed, mollifier}};
 }
 
 /// Slots of the centre now or at the start of the step; `offset` is the collider's native block.
@@ -43,8 +69,7 @@ ColliderPart::ColliderPart(const Scene& scene) {
 
 void ColliderPart::add_native_blocks(const Scene& scene, Model& model) const {
   for (const ColliderScene& c : scene.colliders) {
-    const int orientations = 4 * static_cast<int>(ColliderMotion(c).quaternions().size());
-    add_native_block(model, "collider/" + c.name, first_orientation(c) + orientations, {0});
+    add_native_block(model, "collider/" + c.name, first_size(c, ColliderMotion(c)) + num_sizes(c), {0});
   }
 }
 
@@ -60,12 +85,17 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
     const int base = model.native_block("collider/" + c.name).offset;
     const ColliderMotion motion(c);
     using enum ThetaSlot::Kind;
+    const auto add_size_slots = [&](TermGroup& g) {
+      for (int k = 0; k < num_sizes(c); ++k)
+        g.theta.push_back(constant_slot(base + first_size(c, motion) + k));
+    };
     {
-      Term term("contact " + c.name, contact_kernels(), ContactLaw{shape, c.onset});
+      Term term = contact_term(c, shape);
       TermGroup g = surface_group(model.mesh, SkinSide::outer, rule);
       g.theta = {constant_slot(base), constant_slot(base + 1)};
       add_centre_slots(motion, path_now, base, g);
       add_orientation_slots(c, motion, path_now, base, g);
+      add_size_slots(g);
       term.add_group(std::move(g));
       contact.terms.push_back(static_cast<int>(model.terms.size()));
       contact.shapes.push_back(static_cast<int>(model.shapes.size()) - 1);
@@ -74,14 +104,12 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
     if (has_friction(c)) {
       friction.present = true;
       friction.detail = "lagged pressure and normal at every contact point";
-      Term term(
-          "friction " + c.name, friction_kernels(),
-          FrictionLaw{shape, c.onset, c.friction->slip_speed,
-                      c.friction->mollifier == "quadratic" ? Mollifier::quadratic : Mollifier::quintic});
+      Term term = friction_term(c, shape);
       TermGroup g = surface_group(model.mesh, SkinSide::outer, rule);
       g.theta = {constant_slot(base), constant_slot(base + 1), constant_slot(base + 2)};
       for (const ThetaSlot::Kind kind : {path_now, path_old}) add_centre_slots(motion, kind, base, g);
       for (const ThetaSlot::Kind kind : {path_now, path_old}) add_orientation_slots(c, motion, kind, base, g);
+      add_size_slots(g);
       term.add_group(std::move(g));
       friction.terms.push_back(static_cast<int>(model.terms.size()));
       model.terms.push_back(std::move(term));
@@ -107,6 +135,14 @@ void ColliderPart::set_native(const Scene& scene, const Model& model, VectorXd& 
     for (std::size_t i = 0; i < motion.quaternions().size(); ++i)
       native.segment<4>(static_cast<Eigen::Index>(at + first_orientation(c)) +
                         4 * static_cast<Eigen::Index>(i)) = motion.quaternions()[i];
+    if (num_sizes(c) > 0) {
+      const Vec3& e = c.semi_axes;
+      if (!(e.minCoeff() > 0) || e.maxCoeff() > Ellipsoid::largest_ratio * e.minCoeff())
+        throw InputError(scene.file + ": /colliders/" + c.name + "/semi_axes",
+                         std::to_string(e.minCoeff()) + " to " + std::to_string(e.maxCoeff()) + " mm",
+                         "lengths > 0, none longer than 1000 times the shortest");
+      native.segment<3>(at + first_size(c, motion)) = e;
+    }
   }
 }
 
@@ -119,6 +155,10 @@ bool ColliderPart::add_derivative(const Scene& scene, const Model& model, const 
     if (std::sscanf(key.c_str(), "path/%d/position/%d%n", &knot, &axis, &end) == 2 &&
         end == static_cast<int>(key.size())) {
       d[model.native_block("collider/" + c.name).offset + 3 + 3 * knot + axis] = 1;
+      return true;
+    }
+    if (std::sscanf(key.c_str(), "semi_axes/%d%n", &axis, &end) == 1 && end == static_cast<int>(key.size())) {
+      d[model.native_block("collider/" + c.name).offset + first_size(c, ColliderMotion(c)) + axis] = 1;
       return true;
     }
     if (slot < 0) continue;

@@ -1,7 +1,7 @@
 // The colliders of a scene: rigid shapes on paths that touch the outer surface, with or without friction.
 //
 // Native block per collider "collider/<name>": κ, inflation, μ, then its path knots [3] each, then, when it
-// turns, the knots' quaternions [4] each.
+// turns, the knots' quaternions [4] each, then the semi-axes [3] of an ellipsoid.
 #pragma once
 
 #include "sim/scene/parts/scene_part.h"

@@ -166,6 +166,27 @@ TEST(Capsule, IsASphereRoundItsEndsAndACylinderBetween) {
   EXPECT_EQ(Capsule(3, 0).evaluate(Vec3(1, 2, 7)).gap, sphere.evaluate(Vec3(1, 2, 7)).gap);
 }
 
+// Gap and gradient by the semi-axes, outside and inside, against central differences of the evaluation.
+TEST(Ellipsoid, DerivativesByItsSemiAxes) {
+  const Vec3 axes(7, 4, 5);
+  const Ellipsoid built(Vec3(1, 2, 3));  // what it was built with does not matter
+  for (const Vec3& x : {Vec3(6, 3, 4), Vec3(-2, 4.5, 1), Vec3(3, -1, -3.9), Vec3(0.5, 3.5, 0.2)}) {
+    SizeDerivatives by_size;
+    const GapJet jet = built.evaluate_sized(x, axes, by_size);
+    EXPECT_EQ(jet.gap, Ellipsoid(axes).evaluate(x).gap);
+    const double h = 1e-5;
+    for (int k = 0; k < 3; ++k) {
+      const GapJet more = Ellipsoid(axes + h * Vec3::Unit(k)).evaluate(x),
+                   less = Ellipsoid(axes - h * Vec3::Unit(k)).evaluate(x);
+      EXPECT_NEAR(by_size.gap[k], (more.gap - less.gap) / (2 * h), 1e-9);
+      EXPECT_LT((by_size.gradient.col(k) - (more.gradient - less.gradient) / (2 * h)).norm(), 1e-8);
+    }
+    EXPECT_GT(by_size.gradient.norm(), 1e-3);
+  }
+  SizeDerivatives by_size;
+  EXPECT_THROW((void)Sphere(2).evaluate_sized(Vec3(1, 2, 3), axes, by_size), ContractError);
+}
+
 TEST(Capsule, IsFiniteOnItsAxis) {
   const Capsule capsule(3, 4);
   for (const double z : {0.0, 4.0, -4.0, 1.7}) {
