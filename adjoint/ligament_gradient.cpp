@@ -1,9 +1,6 @@
 #include "adjoint/ligament_gradient.h"
 
-#include <Eigen/Geometry>
-
 #include "sim/element/basis.h"
-#include "sim/scene/parts/scene_part.h"
 
 namespace rhytid::adjoint {
 
@@ -32,17 +29,6 @@ VectorXd ligament_gradient_by_vertex(const Model& model, const VectorXd& native_
       for (int k = 0; k < 3; ++k) by_vertex[corners[k]] += weights[k] * by_column[column];
     }
   return by_vertex;
-}
-
-VectorXd column_areas(const SceneModel& scene_model) {
-  const MatrixX3 nodes = inner_rest_nodes(scene_model.model().mesh);
-  VectorXd areas = VectorXd::Zero(nodes.rows());
-  for (const std::array<int, 3>& t : scene_model.column_triangles()) {
-    const Vec3 u = (nodes.row(t[1]) - nodes.row(t[0])).transpose(),
-               v = (nodes.row(t[2]) - nodes.row(t[0])).transpose();
-    for (const int column : t) areas[column] += u.cross(v).norm() / 6;
-  }
-  return areas;
 }
 
 }  // namespace rhytid::adjoint

@@ -7,12 +7,13 @@
 // ∂Q/∂b.
 //
 // Both are derivatives by single values, and small where columns are dense. For a picture that does not show
-// the mesh divide by the area that a value stands for: ∂Q = ∫ g δb dA, g = (∂Q/∂b)/area.
+// the mesh divide by the area that a value stands for (column_areas in surface_response.h): ∂Q = ∫ g δb dA,
+// g = (∂Q/∂b)/area.
 //
 // Units   of Q times mm (b is 1/mm); g of Q per mm.   Tests   tests/adjoint/outputs_test.cpp
 #pragma once
 
-#include "sim/scene/scene_model.h"
+#include "sim/time/model.h"
 
 namespace rhytid::adjoint {
 
@@ -22,9 +23,5 @@ VectorXd ligament_gradient(const Model& model, const VectorXd& native_bar);
 /// ∂Q/∂b of every vertex of the (cropped) input surface, [num_vertices], b linear between vertices as from a
 /// map file (whose values map_scale multiplies).
 VectorXd ligament_gradient_by_vertex(const Model& model, const VectorXd& native_bar);
-
-/// Area that each column stands for at rest on the inner surface, mm², [num_columns] (a third of the P1
-/// triangles around it): ligament_gradient divided by it is the density g.
-VectorXd column_areas(const SceneModel& scene_model);
 
 }  // namespace rhytid::adjoint

@@ -37,9 +37,9 @@ class PlanCommand final : public StudyCommand {
     app.add_option("--filmed", options_.filmed, "this swipe has been filmed already; repeatable")
         ->allow_extra_args(false)
         ->option_text("NAME");
-    app.add_option(
-           "--parameter", options_.addresses,
-           "an unknown, as /ligaments/stiffness; repeatable (default: all with the same value in all swipes)")
+    app.add_option("--parameter", options_.addresses,
+                   "an unknown, as /ligaments/stiffness; repeatable (default: all but places that "
+                   "have the same value in all swipes)")
         ->allow_extra_args(false)
         ->option_text("ADDRESS");
     app.add_option("--noise", options_.noise, "of each component of a track in each frame, mm (default 0.01)")

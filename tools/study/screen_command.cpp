@@ -33,7 +33,7 @@ class ScreenCommand final : public StudyCommand {
   void add_options(CLI::App& app) override {
     auto* parameters =
         app.add_option("--parameter", options_.addresses,
-                       "screen this address, as /ligaments/stiffness; repeatable (default: all)")
+                       "screen this address, as /ligaments/stiffness; repeatable (default: all but places)")
             ->allow_extra_args(false)
             ->option_text("ADDRESS");
     app.add_option("--bounds", options_.ranges, "table address,lower,upper: screens its parameters")

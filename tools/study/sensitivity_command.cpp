@@ -29,8 +29,9 @@ class SensitivityCommand final : public StudyCommand {
  protected:
   std::string file_help() const override { return "a scene, a case, or experiment.json"; }
   void add_options(CLI::App& app) override {
-    app.add_option("--parameter", options_.addresses,
-                   "differentiate by this address, as /ligaments/stiffness; repeatable (default: all)")
+    app.add_option(
+           "--parameter", options_.addresses,
+           "differentiate by this address, as /ligaments/stiffness; repeatable (default: all but places)")
         ->allow_extra_args(false)
         ->option_text("ADDRESS");
     app.add_option("--variant", options_.variant, "of an experiment (default: the first)")

@@ -100,8 +100,13 @@ std::optional<Trajectory> polished_run(const SceneModel& scene_model, Progress& 
 }
 
 std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vector<std::string>& addresses) {
-  if (addresses.empty()) return all_parameters(scene);
   std::vector<ParameterSpec> specs;
+  if (addresses.empty()) {
+    // Places are no matter of per cents: they are looked at when they are asked for.
+    for (const ParameterSpec& spec : all_parameters(scene))
+      if (spec.transform != ParameterTransform::none) specs.push_back(spec);
+    return specs;
+  }
   for (const std::string& address : addresses) {
     specs.push_back(describe_parameter(scene, address));
     for (std::size_t k = 0; k + 1 < specs.size(); ++k)

@@ -44,7 +44,8 @@ VariantIdentity study_identity(const Scene& scene, const Model& model, const std
 /// it was interrupted or did not reach its last frame; `code` then says which, and the reason is on stderr.
 std::optional<Trajectory> polished_run(const SceneModel& scene_model, Progress& progress, ExitCode& code);
 
-/// Names as addresses of `scene`, or all that the scene has when empty. Throws InputError for one that it has
+/// Names as addresses of `scene`, or when empty all that the scene has but places (of sources, of knots of
+/// paths), which per cents say nothing of. Throws InputError for one that it has
 /// not, or that is given twice.
 std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vector<std::string>& addresses);
 
