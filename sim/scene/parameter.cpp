@@ -237,18 +237,21 @@ std::string expected_parameter(const Scene& scene, std::string_view address) {
   const auto is_kind = [rule](const Kind& kind) { return rule->pointer == kind.pattern; };
   if (is_number && std::none_of(std::begin(kinds), std::end(kinds), is_kind))
     return "a scalar that can be fitted, which this one is not; " + list;
+  bool is_absent = false;  // not in this scene, or 0
   for (const Kind& kind : kinds) {
     const std::vector<std::string> names = item_names(scene, kind.pattern);
     for (size_t i = 0; i < names.size(); ++i)
       if (kind.member(const_cast<Scene&>(scene), i) == nullptr &&
           (address == filled(kind.pattern, names[i]) || address == filled(kind.pattern, std::to_string(i))))
-        return "a value that this scene has and that is not 0; " + list;
+        is_absent = true;
   }
   std::vector<std::string> addresses;
   for (const Found& found : find_all(scene)) addresses.push_back(found.address);
   const std::string nearest = nearest_word(address, addresses);
   return nearest.empty() ? "a scene with parameters"
-                         : "a fit-able scalar, nearest is " + nearest + "; " + list;
+                         : (is_absent ? "a value that this scene has and that is not 0, nearest is "
+                                      : "a fit-able scalar, nearest is ") +
+                               nearest + "; " + list;
 }
 
 std::vector<ParameterSpec> all_parameters(const Scene& scene) {

@@ -210,9 +210,9 @@ TEST(Resimulate, ReturnsToTheRunFromTheStateBefore) {
 TEST(ParameterSpace, JacobianIsTheDerivativeOfNative) {
   for (const std::vector<std::string>& more :
        {std::vector<std::string>{},
-        {"/skin/pre_stretch={\"stretch\":1.1,\"across\":0.95}", "/colliders/finger/shape=ellipsoid",
-         "/colliders/finger/semi_axes=[7,4,5]", "/colliders/finger/path/2/rotation=[0.1,0.6,0.4]",
-         "/colliders/finger/interpolation=spline"}}) {
+        {"/skin/pre_stretch={\"stretch\":1.1,\"across\":0.95,\"direction\":[1,0.2,0]}",
+         "/colliders/finger/shape=ellipsoid", "/colliders/finger/semi_axes=[7,4,5]",
+         "/colliders/finger/path/2/rotation=[0.1,0.6,0.4]", "/colliders/finger/interpolation=spline"}}) {
     const SceneModel model(parse_scene_text(test::drag_scene(2, 4), "test.json", settings(more)));
     const std::vector<ParameterSpec> all = all_parameters(model.scene());
     ASSERT_GE(all.size(), 30u);

@@ -1,6 +1,8 @@
 // The same small surface in every format, written here independently of the readers.
 #pragma once
 
+#include <unistd.h>
+
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -22,7 +24,8 @@ std::string bytes_of(T value, bool big_endian = false) {
 }
 
 inline std::string write_file(const std::string& name, const std::string& bytes) {
-  const std::string path = testing::TempDir() + "rhytid_" + name;
+  // Tests of one name run beside each other.
+  const std::string path = testing::TempDir() + "rhytid_" + std::to_string(::getpid()) + "_" + name;
   std::ofstream(path, std::ios::binary) << bytes;
   return path;
 }
