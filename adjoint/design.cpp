@@ -21,7 +21,7 @@ std::vector<int> with(std::vector<int> list, int item) {
 }  // namespace
 
 const char* name(DesignCriterion criterion) {
-  return criterion == DesignCriterion::D ? "D" : "A";
+  return criterion == DesignCriterion::d_optimality ? "D" : "A";
 }
 
 MatrixXd Posterior::correlation() const {

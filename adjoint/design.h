@@ -1,8 +1,8 @@
 // What planned experiments will tell, before any of them is made: their information adds, and the posterior
 // with a prior follows, to first order.
 //
-//   Cov = (Σ_e R_eᵀR_e + diag(1/prior²))⁻¹       R_e: whitened Jacobian of experiment e, or its triangular
-//   root D   = ln det Cov: the volume of what remains possible    A = tr Cov: the sum of the variances
+//   Cov = (Σ_e R_eᵀR_e + diag(1/prior²))⁻¹    R_e: whitened Jacobian of experiment e, or its triangular root
+//   D = ln det Cov: the volume of what remains possible      A = tr Cov: the sum of the variances
 //
 // in the coordinates of the Jacobian (log parameters). Smaller is better for both. D does not depend on how
 // parameters are scaled or combined, A does. The covariance is formed from the triangular root of the stack,
@@ -18,7 +18,8 @@
 
 namespace rhytid::adjoint {
 
-enum class DesignCriterion { D, A };
+/// What a plan makes as small as it can: D or A of the head of this file.
+enum class DesignCriterion { d_optimality, a_optimality };
 const char* name(DesignCriterion criterion);
 
 struct Posterior {
@@ -27,7 +28,9 @@ struct Posterior {
   double trace = 0;     ///< A
   VectorXd deviations() const { return covariance.diagonal().cwiseSqrt(); }
   MatrixXd correlation() const;
-  double value(DesignCriterion criterion) const { return criterion == DesignCriterion::D ? log_det : trace; }
+  double value(DesignCriterion criterion) const {
+    return criterion == DesignCriterion::d_optimality ? log_det : trace;
+  }
 };
 
 /// Posterior of the experiments `chosen` (indices into `roots`, repetition counts twice) with standard

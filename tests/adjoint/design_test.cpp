@@ -47,7 +47,7 @@ const std::vector<MatrixXd> kThree = {row(10, 10), row(11, 11), row(4, -4)};
 
 TEST(Design, TheBestPairIsOfExperimentsThatComplementEachOther) {
   const VectorXd prior = Eigen::Vector2d(1, 1);
-  for (const DesignCriterion criterion : {DesignCriterion::D, DesignCriterion::A}) {
+  for (const DesignCriterion criterion : {DesignCriterion::d_optimality, DesignCriterion::a_optimality}) {
     SCOPED_TRACE(name(criterion));
     const auto plan = greedy_design(kThree, prior, criterion, {}, 5);
     ASSERT_EQ(plan.size(), 3u);
@@ -64,15 +64,16 @@ TEST(Design, TheBestPairIsOfExperimentsThatComplementEachOther) {
     EXPECT_NEAR(pairs[0].value, plan[1].value, 1e-13);
   }
   // det of 1 + 2·242 along the sum's axis and 1 + 2·16... in closed form: eigenvalues 1 + 2 s².
-  EXPECT_NEAR(greedy_design(kThree, prior, DesignCriterion::D, {}, 2)[1].value,
+  EXPECT_NEAR(greedy_design(kThree, prior, DesignCriterion::d_optimality, {}, 2)[1].value,
               -std::log((1 + 2 * 121.) * (1 + 2 * 16.)), 1e-12);
-  EXPECT_NEAR(greedy_design(kThree, prior, DesignCriterion::A, {}, 2)[1].value, 1 / 243. + 1 / 33., 1e-14);
+  EXPECT_NEAR(greedy_design(kThree, prior, DesignCriterion::a_optimality, {}, 2)[1].value, 1 / 243. + 1 / 33.,
+              1e-14);
 }
 
 TEST(Design, WhatHasBeenFilmedCounts) {
   const VectorXd prior = Eigen::Vector2d(1, 1);
   // The sum is known already: now the difference is best.
-  const auto plan = greedy_design(kThree, prior, DesignCriterion::D, {1}, 1);
+  const auto plan = greedy_design(kThree, prior, DesignCriterion::d_optimality, {1}, 1);
   ASSERT_EQ(plan.size(), 1u);
   EXPECT_EQ(plan[0].experiment, 2);
 }
@@ -82,8 +83,8 @@ TEST(Design, DAndADisagreeAboutScales) {
   // second.
   const VectorXd prior = Eigen::Vector2d(1, 0.1);
   const std::vector<MatrixXd> roots = {row(1, 0), row(0, 100)};
-  EXPECT_EQ(greedy_design(roots, prior, DesignCriterion::A, {}, 1)[0].experiment, 0);
-  EXPECT_EQ(greedy_design(roots, prior, DesignCriterion::D, {}, 1)[0].experiment, 1);
+  EXPECT_EQ(greedy_design(roots, prior, DesignCriterion::a_optimality, {}, 1)[0].experiment, 0);
+  EXPECT_EQ(greedy_design(roots, prior, DesignCriterion::d_optimality, {}, 1)[0].experiment, 1);
 }
 
 TEST(Design, RefusesAPriorThatIsNone) {

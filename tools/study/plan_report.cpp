@@ -15,7 +15,7 @@ namespace {
 using adjoint::DesignCriterion;
 using adjoint::Posterior;
 
-constexpr DesignCriterion kCriteria[] = {DesignCriterion::D, DesignCriterion::A};
+constexpr DesignCriterion kCriteria[] = {DesignCriterion::d_optimality, DesignCriterion::a_optimality};
 constexpr std::size_t kPairsShown = 10;
 
 std::vector<int> and_filmed(const Plan& plan, std::vector<int> swipes) {
@@ -89,8 +89,9 @@ void write_tables(const std::string& folder, const Plan& plan) {
 std::vector<std::string> recommendations(const Plan& plan) {
   std::vector<std::string> lines;
   for (const DesignCriterion criterion : kCriteria) {
-    const std::string what = criterion == DesignCriterion::D ? "By D (volume of what remains possible)"
-                                                             : "By A (sum of the variances)";
+    const std::string what = criterion == DesignCriterion::d_optimality
+                                 ? "By D (volume of what remains possible)"
+                                 : "By A (sum of the variances)";
     const auto steps = adjoint::greedy_design(plan.roots, plan.priors, criterion, plan.filmed,
                                               static_cast<int>(plan.swipes.size()));
     std::string line = what + ": film next";
