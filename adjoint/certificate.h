@@ -8,7 +8,8 @@
 //   pivots         smallest pivot of the Hessian, step by step: dips where a bifurcation is near
 //   repeatability  the same bits twice, and with one and two threads
 //
-// Source   adjoint/README.md, The certificate.    Tests    tests/adjoint/certificate_test.cpp
+// Source   adjoint/README.md, The certificate
+// Tests    tests/adjoint/certificate_test.cpp
 #pragma once
 
 #include <functional>

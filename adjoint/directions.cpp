@@ -20,6 +20,15 @@ constexpr double kMentioned = 0.3;
 /// And so are all beyond this many; the sentence then says how many they are.
 constexpr int kMentionedAtMost = 8;
 
+/// The sign of a singular vector is free: makes the largest component of each column from `first` on positive.
+void choose_signs(MatrixXd& columns, Eigen::Index first) {
+  for (Eigen::Index i = first; i < columns.cols(); ++i) {
+    Eigen::Index largest;
+    columns.col(i).cwiseAbs().maxCoeff(&largest);
+    if (columns(largest, i) < 0) columns.col(i) *= -1;
+  }
+}
+
 }  // namespace
 
 MatrixXd Directions::basis() const {
@@ -39,11 +48,7 @@ Directions directions_of(const MatrixXd& jacobian) {
   const Eigen::JacobiSVD<MatrixXd> svd(jacobian, Eigen::ComputeThinV);
   d.singular_values = svd.singularValues();
   d.right_vectors = svd.matrixV();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    Eigen::Index largest;  // the sign of a singular vector is free
-    d.right_vectors.col(i).cwiseAbs().maxCoeff(&largest);
-    if (d.right_vectors(largest, i) < 0) d.right_vectors.col(i) *= -1;
-  }
+  choose_signs(d.right_vectors, 0);
   while (d.rank < n && d.singular_values[d.rank] > kNullTolerance * d.singular_values[0]) ++d.rank;
   return d;
 }
@@ -65,11 +70,7 @@ bool lead_null_space(Directions& d, const VectorXd& direction) {
   }
   MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(first).householderQ();
   d.right_vectors.rightCols(count) = null_vectors * Q;
-  for (Eigen::Index i = d.rank; i < n; ++i) {
-    Eigen::Index largest;
-    d.right_vectors.col(i).cwiseAbs().maxCoeff(&largest);
-    if (d.right_vectors(largest, i) < 0) d.right_vectors.col(i) *= -1;
-  }
+  choose_signs(d.right_vectors, d.rank);
   return true;
 }
 

@@ -1,8 +1,8 @@
 // Scene parameters as coordinates without units, zero at the scene's own values: what random directions,
 // steps of a Taylor test and sizes of gradients are measured in.
 //
-//   log    p = p₀ eˣ        logit  ln((p−l)/(u−p)) = ln((p₀−l)/(u−p₀)) + x        none   p = p₀ + x s,  s =
-//   (u−l)/2
+//   log    p = p₀ eˣ        logit  ln((p−l)/(u−p)) = ln((p₀−l)/(u−p₀)) + x        none   p = p₀ + x s,
+//   s = (u−l)/2
 //
 // Tests    tests/adjoint/sweeps_test.cpp
 #pragma once

@@ -7,7 +7,8 @@
 // it is fitted all the same: κ = κ_scene · E_gauge / E_gauge,scene, so that no fixed penalty in MPa/mm
 // becomes the yardstick of the tissue.
 //
-// Source   the potential is homogeneous in all stiffnesses: tests/verification/README.md, T16.   Tests  tests/fitting/fit_test.cpp
+// Source   the potential is homogeneous in all stiffnesses: tests/verification/README.md, T16
+// Tests    tests/fitting/fit_test.cpp
 #pragma once
 
 #include <optional>

@@ -6,6 +6,7 @@
 #include "adjoint/certificate_report.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "tools/polished_run.h"
 #include "tools/scene_argument.h"
 #include "tools/verb.h"
 
@@ -47,34 +48,19 @@ class Certify : public Verb {
         load_scene_argument(context.options.file, context.options.settings, context.progress));
     for (const std::string& address : addresses_) (void)describe_parameter(scene_model.scene(), address);
     const std::string folder = context.output_folder();
-    RunOptions options = scene_model.run_options();
-    options.minimiser = adjoint::certificate_minimiser(options.minimiser);
-
-    progress.stage("simulation", options.frames);
-    RunObserver observer;
-    observer.iteration = [&](int, double, int iteration, double, double residual) {
-      progress.iteration(iteration, residual);
-      return !progress.interrupted();
-    };
-    observer.step = [&](const StepEvent& event) {
-      if (event.frame_done) progress.step_done(event.record.frame);
-    };
-    const Trajectory run = simulate(scene_model.model(), scene_model.native(), options, observer);
-    if (progress.interrupted()) return ExitCode::interrupted;
-    if (!run.complete) {
-      progress.error("the run has no gradient, since it did not reach its last frame: " + run.failure);
-      return ExitCode::not_converged;
-    }
+    ExitCode code = ExitCode::ok;
+    const std::optional<Trajectory> run = polished_run(scene_model, progress, code);
+    if (!run) return code;
 
     const auto output = adjoint::default_output(scene_model.model(), points_);
-    const auto weights = adjoint::random_weights(*output, run.frames(), seed_);
+    const auto weights = adjoint::random_weights(*output, run->frames(), seed_);
     adjoint::CertificateOptions certificate;
     certificate.addresses = addresses_;
     certificate.each_parameter = thorough_;
     certificate.seed = seed_;
     adjoint::CertificateReport report;
     try {
-      report = adjoint::certify(scene_model, run, *output, weights, certificate,
+      report = adjoint::certify(scene_model, *run, *output, weights, certificate,
                                 [&](const std::string& part, int done, int total) {
                                   if (done == 0) {
                                     progress.stage(part, total);

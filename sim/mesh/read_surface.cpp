@@ -35,17 +35,15 @@ void refuse_doubtful_unit(const TriangleSurface& surface) {
                    " (a head is about 250 mm wide)");
 }
 
-void refuse_giant(const TriangleSurface& surface) {
-  if (surface.vertices.rows() == 0) return;
+std::string giant_hint(const TriangleSurface& surface) {
+  if (surface.vertices.rows() == 0) return "";
   const double extent =
       (surface.vertices.colwise().maxCoeff() - surface.vertices.colwise().minCoeff()).maxCoeff();
-  if (extent <= 5000) return;
+  if (extent <= 5000) return "";
   char text[160];
   std::snprintf(text, sizeof text,
-                ": extent %.4g m, where the crop finds nothing; is mm_per_unit right (a head is about "
-                "250 mm wide)?",
-                extent / 1000);
-  throw InputError(surface.origin + text);
+                " (its extent is %.4g m: is mm_per_unit right? a head is about 250 mm wide)", extent / 1000);
+  return text;
 }
 
 }  // namespace rhytid

@@ -91,8 +91,8 @@ void refuse_coincident_vertices(const TriangleSurface& surface);
 /// 2 (metres) or up to 60 (a head in cm, or a patch in mm: only the user can tell). For files that come
 /// without mm_per_unit; above that, validate_surface judges what is used.
 void refuse_doubtful_unit(const TriangleSurface& surface);
-/// Refuses what is larger than any body, 5 m: a reason for a crop to find nothing. Throws InputError with the extent.
-void refuse_giant(const TriangleSurface& surface);
+/// For the message of a crop that fails: the extent of a surface larger than any body, 5 m; else empty.
+std::string giant_hint(const TriangleSurface& surface);
 
 enum class GridPattern { union_jack, diagonal_plus, diagonal_minus };
 

@@ -22,79 +22,54 @@ std::vector<double> weights(double deviation, double spacing) {
   return w;
 }
 
-/// Value at each point of the straight line fitted around it.
-VectorXd smooth(const VectorXd& h, double deviation, double spacing) {
-  const std::vector<double> w = weights(deviation, spacing);
-  const int n = static_cast<int>(h.size()), reach = static_cast<int>(w.size()) - 1;
-  VectorXd out(n);
-  for (int i = 0; i < n; ++i) {
-    double s0 = 0, s1 = 0, s2 = 0, m0 = 0, m1 = 0;
-    for (int j = std::max(0, i - reach); j <= std::min(n - 1, i + reach); ++j) {
-      const double d = j - i, weight = w[std::abs(j - i)];
-      s0 += weight, s1 += weight * d, s2 += weight * d * d;
-      m0 += weight * h[j], m1 += weight * d * h[j];
-    }
-    const double det = s0 * s2 - s1 * s1;
-    out[i] = det > 1e-12 * s0 * s0 ? (s2 * m0 - s1 * m1) / det : m0 / s0;
+/// Visits every point of `mask` around (x, y) that is on the surface with its coefficient c in the value there of the
+/// plane that is fitted to the heights h, weighted by a Gaussian: value = Σ c h. Of a straight line when there is
+/// but one column; too few neighbours for either give their mean.
+template <class Visit>
+void for_local_fit(const MatrixXd& mask, const std::vector<double>& w, int x, int y, Visit&& visit) {
+  const int nx = static_cast<int>(mask.rows()), ny = static_cast<int>(mask.cols());
+  const int reach = static_cast<int>(w.size()) - 1;
+  const auto for_neighbours = [&](auto&& each) {
+    for (int j = std::max(0, y - reach); j <= std::min(ny - 1, y + reach); ++j)
+      for (int i = std::max(0, x - reach); i <= std::min(nx - 1, x + reach); ++i)
+        if (!std::isnan(mask(i, j)))
+          each(i, j, w[std::abs(i - x)] * w[std::abs(j - y)], Vec3(1, i - x, j - y));
+  };
+  Mat3 moments = Mat3::Zero();
+  for_neighbours([&](int, int, double weight, const Vec3& p) { moments += weight * p * p.transpose(); });
+  const double s0 = moments(0, 0), det = s0 * moments(1, 1) - moments(1, 0) * moments(1, 0);
+  Vec3 fit(1 / s0, 0, 0);
+  if (ny == 1) {
+    if (det > 1e-12 * s0 * s0) fit = Vec3(moments(1, 1), -moments(1, 0), 0) / det;
+  } else if (moments.determinant() > 1e-12 * std::pow(s0, 3)) {
+    fit = moments.ldlt().solve(Vec3::UnitX());
   }
-  return out;
+  for_neighbours([&](int i, int j, double weight, const Vec3& p) { visit(i, j, weight * fit.dot(p)); });
 }
 
-/// Value at each point of the plane fitted around it.
+/// Value at each point of the plane (line) fitted around it, NaN beside the surface.
 MatrixXd smooth(const MatrixXd& h, double deviation, double spacing) {
   const std::vector<double> w = weights(deviation, spacing);
-  const int nx = static_cast<int>(h.rows()), ny = static_cast<int>(h.cols());
-  const int reach = static_cast<int>(w.size()) - 1;
-  MatrixXd out = MatrixXd::Constant(nx, ny, std::numeric_limits<double>::quiet_NaN());
-  for (int y = 0; y < ny; ++y)
-    for (int x = 0; x < nx; ++x) {
+  MatrixXd out = MatrixXd::Constant(h.rows(), h.cols(), std::numeric_limits<double>::quiet_NaN());
+  for (int y = 0; y < h.cols(); ++y)
+    for (int x = 0; x < h.rows(); ++x) {
       if (std::isnan(h(x, y))) continue;
-      Mat3 moments = Mat3::Zero();
-      Vec3 right = Vec3::Zero();
-      for (int j = std::max(0, y - reach); j <= std::min(ny - 1, y + reach); ++j)
-        for (int i = std::max(0, x - reach); i <= std::min(nx - 1, x + reach); ++i) {
-          if (std::isnan(h(i, j))) continue;
-          const double weight = w[std::abs(i - x)] * w[std::abs(j - y)];
-          const Vec3 p(1, i - x, j - y);
-          moments += weight * p * p.transpose();
-          right += weight * h(i, j) * p;
-        }
-      // Too few neighbours for a plane: their mean.
-      out(x, y) = moments.determinant() > 1e-12 * std::pow(moments(0, 0), 3)
-                      ? Vec3(moments.ldlt().solve(right))[0]
-                      : right[0] / moments(0, 0);
+      double value = 0;
+      for_local_fit(h, w, x, y, [&](int i, int j, double c) { value += c * h(i, j); });
+      out(x, y) = value;
     }
   return out;
 }
 
-/// Adds factor times the transpose of `smooth` (of lines: one column) applied to the weights.
-void add_smooth_transpose(const MatrixXd& weights, double deviation, double spacing, double factor,
+/// Adds factor times the transpose of `smooth` applied to `bars`, NaN beside the surface.
+void add_smooth_transpose(const MatrixXd& bars, double deviation, double spacing, double factor,
                           MatrixXd& out) {
-  const std::vector<double> w = ::rhytid::weights(deviation, spacing);
-  const int nx = static_cast<int>(weights.rows()), ny = static_cast<int>(weights.cols());
-  const int reach = static_cast<int>(w.size()) - 1;
-  for (int y = 0; y < ny; ++y)
-    for (int x = 0; x < nx; ++x) {
-      if (std::isnan(weights(x, y)) || weights(x, y) == 0) continue;
-      const auto for_neighbours = [&](auto&& visit) {
-        for (int j = std::max(0, y - reach); j <= std::min(ny - 1, y + reach); ++j)
-          for (int i = std::max(0, x - reach); i <= std::min(nx - 1, x + reach); ++i)
-            if (!std::isnan(weights(i, j)))
-              visit(i, j, w[std::abs(i - x)] * w[std::abs(j - y)], Vec3(1, i - x, j - y));
-      };
-      Mat3 moments = Mat3::Zero();
-      for_neighbours([&](int, int, double weight, const Vec3& p) { moments += weight * p * p.transpose(); });
-      // Value = fit · Σ weight h p: of a plane, of a straight line when there is but one column, or the mean.
-      Vec3 fit(1 / moments(0, 0), 0, 0);
-      const double s0 = moments(0, 0), det = s0 * moments(1, 1) - moments(1, 0) * moments(1, 0);
-      if (ny == 1) {
-        if (det > 1e-12 * s0 * s0) fit = Vec3(moments(1, 1), -moments(1, 0), 0) / det;
-      } else if (moments.determinant() > 1e-12 * std::pow(s0, 3)) {
-        fit = moments.ldlt().solve(Vec3::UnitX());
-      }
-      const double value = factor * weights(x, y);
-      for_neighbours(
-          [&](int i, int j, double weight, const Vec3& p) { out(i, j) += value * weight * fit.dot(p); });
+  const std::vector<double> w = weights(deviation, spacing);
+  for (int y = 0; y < bars.cols(); ++y)
+    for (int x = 0; x < bars.rows(); ++x) {
+      if (std::isnan(bars(x, y)) || bars(x, y) == 0) continue;
+      const double bar = factor * bars(x, y);
+      for_local_fit(bars, w, x, y, [&](int i, int j, double c) { out(i, j) += c * bar; });
     }
 }
 
@@ -103,11 +78,10 @@ double derivative(double b2, double b1, double a1, double a2, double spacing) {
   return (8 * (a1 - b1) - (a2 - b2)) / (12 * spacing);
 }
 
-template <class Heights>
-Heights pass(const Heights& h, double spacing, const WrinkleBand& band) {
+MatrixXd pass(const MatrixXd& h, double spacing, const WrinkleBand& band) {
   band.validate();
   require(spacing > 0, "band_pass: the spacing must be positive");
-  Heights out = h;
+  MatrixXd out = h;
   if (band.shortest > 0) out = smooth(h, half_pass_deviation(band.shortest), spacing);
   if (std::isfinite(band.longest)) out -= smooth(h, half_pass_deviation(band.longest), spacing);
   return out;

@@ -165,8 +165,8 @@ void check_motion(const ColliderScene& collider, const std::string& file) {
                      "at most " + std::to_string(KnotPath::max_spline_knots) + ", or linear");
   for (std::size_t k = 1; k < knots; ++k) {
     const PathKnot &before = collider.path[k - 1], &knot = collider.path[k];
-    // Numbers beyond half a turn are meant as they stand: 0 to 300 degrees would turn by −60. Orientations from a
-    // file are never written so; from 179 to −179 degrees is a turn by 2.
+    // Numbers beyond half a turn are meant as they stand: 0 to 300 degrees would turn by −60. Orientations
+    // from a file are never written so; from 179 to −179 degrees is a turn by 2.
     const bool is_meant = std::max(before.rotation.norm(), knot.rotation.norm()) > 1.0001 * std::numbers::pi;
     const double written = is_meant ? (knot.rotation - before.rotation).norm() : 0;
     const double degrees = std::max(angle_between(before, knot), written) * 180 / std::numbers::pi;

@@ -190,10 +190,10 @@ std::vector<Rule> contact_rules() {
        .type = vector3,
        .dimension = dimension::angle,
        .fallback = vector_json(Vec3::Zero()),
-       .doc = "Orientation: axis times angle. From knot to knot the body turns the "
-              "shorter way, by at most 170 degrees; what is written with more than 180 degrees is meant as "
-              "it stands "
-              "and refused if that is a longer way."},
+       .doc =
+           "Orientation: axis times angle. From knot to knot the body turns the shorter way, by at most 170 "
+           "degrees; what is written with more than 180 degrees is meant as it stands and refused if that is "
+           "a longer way."},
   };
 }
 

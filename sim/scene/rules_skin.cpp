@@ -422,8 +422,7 @@ std::vector<Rule> ligament_rules() {
        .fallback = source.strength,
        .min = 0,
        .doc = "Exponent b at the source; 0 is the limit of the law: exponential ligaments pull with the same "
-              "force at any length, quadratic ones "
-              "are linear springs."},
+              "force at any length, quadratic ones are linear springs."},
       {.pointer = "/ligaments/sources/*/radius",
        .type = number,
        .dimension = dimension::length,

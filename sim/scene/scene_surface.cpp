@@ -69,9 +69,8 @@ TriangleSurface scene_surface(const SurfaceScene& s) {
   if (s.coincident == "join" || (s.coincident == "auto" && has_seams)) join_coincident_vertices(mesh);
   try {
     mesh = cropped(mesh, s);
-  } catch (const InputError&) {
-    refuse_giant(mesh);  // says why the crop found nothing
-    throw;
+  } catch (const InputError& error) {
+    throw InputError(error.what() + giant_hint(mesh));
   }
   if (s.coincident == "auto") refuse_coincident_vertices(mesh);
   if (s.subdivide > 0) return subdivide_surface(mesh, s.subdivide);

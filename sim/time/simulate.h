@@ -60,6 +60,7 @@ struct Trajectory {
   std::string failure;    ///< one sentence when not complete
   double seconds = 0;     ///< wall time
 
+  /// Frames reached; −1 when the skin did not even settle to frame 0.
   int frames() const { return static_cast<int>(frame_end.size()) - 1; }
   /// State before step i and at the end of frame f (states kept).
   const State& before(int step) const { return step == 0 ? initial : steps[step - 1].state; }

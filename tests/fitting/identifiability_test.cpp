@@ -12,25 +12,13 @@
 #include <random>
 
 #include "fitting/track_noise.h"
+#include "log_variables.h"
 
 namespace rhytid::fitting {
 namespace {
 
-using testing::HasSubstr;
-
-std::vector<FitVariable> variables(std::vector<std::string> names) {
-  std::vector<FitVariable> list;
-  for (const std::string& name : names)
-    list.push_back({.address = "/" + name,
-                    .name = name,
-                    .unit = "",
-                    .transform = ParameterTransform::log,
-                    .initial = 1,
-                    .lower = 0.1,
-                    .upper = 10,
-                    .prior_sigma = {}});
-  return list;
-}
+using ::testing::HasSubstr;
+using testing::log_variables;
 
 MatrixXd random_matrix(int rows, int cols, double scale) {
   std::mt19937 rng(5);
@@ -43,7 +31,7 @@ MatrixXd random_matrix(int rows, int cols, double scale) {
 TEST(Identifiability, AgreesWithTheInverseNormalMatrix) {
   const MatrixXd j = random_matrix(50, 3, 10);
   const MatrixXd covariance = (j.transpose() * j).inverse();
-  const Identifiability found(j, variables({"a", "b", "c"}), 1.5, 47);
+  const Identifiability found(j, log_variables({"a", "b", "c"}), 1.5, 47);
   EXPECT_EQ(found.rank(), 3);
   for (int k = 0; k < 3; ++k) {
     EXPECT_NEAR(found.sigma(k), 1.5 * std::sqrt(covariance(k, k)), 1e-12);
@@ -59,7 +47,7 @@ TEST(Identifiability, AgreesWithTheInverseNormalMatrix) {
 TEST(Identifiability, OneCovarianceOfNoiseAndMisfit) {
   constexpr int kTracks = 50, kParameters = 3;
   const MatrixXd j = random_matrix(kTracks, kParameters, 10);
-  const auto names = variables({"a", "b", "c"});
+  const auto names = log_variables({"a", "b", "c"});
   const auto tracks = [&](double size) {
     std::mt19937 rng(8);
     std::normal_distribution<double> normal;
@@ -103,7 +91,7 @@ TEST(Identifiability, OneCovarianceOfNoiseAndMisfit) {
 TEST(Identifiability, NamesAnExactTradeOffAndKeepsTheRatio) {
   MatrixXd j = random_matrix(50, 3, 10);
   j.col(1) = -j.col(0);  // a and b scaled together change nothing
-  const Identifiability found(j, variables({"a", "b", "c"}), 1, 40);
+  const Identifiability found(j, log_variables({"a", "b", "c"}), 1, 40);
   EXPECT_EQ(found.rank(), 2);
   EXPECT_TRUE(std::isinf(found.sigma(0)));
   EXPECT_TRUE(std::isfinite(found.sigma(2)));
@@ -113,14 +101,14 @@ TEST(Identifiability, NamesAnExactTradeOffAndKeepsTheRatio) {
   EXPECT_TRUE(found.determined(2));
   const auto sentences = found.cannot_tell();
   ASSERT_EQ(sentences.size(), 3u);
-  EXPECT_THAT(sentences[0], testing::AnyOf(HasSubstr("a, b go together"), HasSubstr("b, a go together")));
+  EXPECT_THAT(sentences[0], ::testing::AnyOf(HasSubstr("a, b go together"), HasSubstr("b, a go together")));
   EXPECT_THAT(sentences[1], HasSubstr("does not determine a: any value fits"));
 }
 
 TEST(Identifiability, WeakDirectionIsAStatementNotAnError) {
   MatrixXd j = random_matrix(50, 2, 10);
   j.col(1) = j.col(0) + 1e-3 * j.col(1);
-  const Identifiability found(j, variables({"soft modulus", "ligament k"}), 1, 40);
+  const Identifiability found(j, log_variables({"soft modulus", "ligament k"}), 1, 40);
   EXPECT_EQ(found.rank(), 2);
   EXPECT_FALSE(found.determined(1));
   EXPECT_THAT(found.cannot_tell().at(0), HasSubstr("trade off against"));
@@ -133,10 +121,10 @@ TEST(Identifiability, DirectionsOfManyParametersHaveNames) {
   const MatrixXd j = any - (any * common) * common.transpose();
   std::vector<std::string> names;
   for (int k = 0; k < n; ++k) names.push_back("p" + std::to_string(k));
-  const Identifiability found(j, variables(names), 1, 40);
+  const Identifiability found(j, log_variables(names), 1, 40);
   EXPECT_EQ(found.rank(), n - 1);
   EXPECT_THAT(found.cannot_tell().at(0),
-              testing::AllOf(HasSubstr("p"), HasSubstr(" and 17 more go together")));
+              ::testing::AllOf(HasSubstr("p"), HasSubstr(" and 17 more go together")));
 }
 
 // Intervals as a fit makes them, over repeated noise of exactly the stated kind, in a problem that is linear:
@@ -190,7 +178,7 @@ TEST(Identifiability, IntervalsHoldTheTruthAsOftenAsTheySay) {
       for (int i = 0; i < kTracks; ++i)
         tracks.push_back(
             {Vec2(i % 6, i / 6), numbers, j.middleRows(i * rows, rows), z.segment(i * rows, rows)});
-      const Identifiability found(j, variables({"a", "b", "c"}), interval_widening(squares, rho), dof,
+      const Identifiability found(j, log_variables({"a", "b", "c"}), interval_widening(squares, rho), dof,
                                   tracks);
       for (int k = 0; k < kParameters; ++k) inside += std::fabs(t[k]) <= found.half_width(k);
       chi += squares / kRepeats;

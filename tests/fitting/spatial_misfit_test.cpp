@@ -9,20 +9,12 @@
 #include <random>
 
 #include "fitting/identifiability.h"
+#include "log_variables.h"
 
 namespace rhytid::fitting {
 namespace {
 
-std::vector<FitVariable> variables(int count) {
-  return std::vector<FitVariable>(count, {.address = "/p",
-                                          .name = "p",
-                                          .unit = "",
-                                          .transform = ParameterTransform::log,
-                                          .initial = 1,
-                                          .lower = 0.1,
-                                          .upper = 10,
-                                          .prior_sigma = {}});
-}
+using testing::log_variables;
 
 /// About 196 points on a grid over 1 × height.
 std::vector<Vec2> points(double height) {
@@ -90,8 +82,9 @@ Coverage coverage(double height, double length, double size, int parameters, int
     const VectorXd left = z - j * t;
     const int dof = static_cast<int>(n) - parameters;
     const double widening = interval_widening(left.squaredNorm() / dof, 0);
-    const Identifiability noise(j, variables(parameters), widening, dof),
-        both(j, variables(parameters), widening, dof, one_row_each(at, j, left));
+    const Identifiability noise(j, log_variables(std::vector<std::string>(parameters, "p")), widening, dof),
+        both(j, log_variables(std::vector<std::string>(parameters, "p")), widening, dof,
+             one_row_each(at, j, left));
     for (int k = 0; k < parameters; ++k) {
       found.by_noise += std::fabs(t[k]) <= noise.half_width(k) ? 1. / (repeats * parameters) : 0;
       found.by_both += std::fabs(t[k]) <= both.half_width(k) ? 1. / (repeats * parameters) : 0;
@@ -249,7 +242,7 @@ TEST(SpatialMisfit, ThinsManyTracks) {
     MatrixXd j(1600, 2);
     for (int k = 0; k < 2; ++k) j.col(k) = fields.white(1600);
     const VectorXd z = fields.white(1600), left = z - j * j.householderQr().solve(z);
-    const Identifiability noise(j, variables(2), 1, 1598);
+    const Identifiability noise(j, log_variables({"p", "p"}), 1, 1598);
     const SpatialMisfit misfit(one_row_each(at, j, left), noise.basis());
     mean += misfit.covariance().trace() / (2 * kRepeats);
     EXPECT_GT(misfit.degrees(Vec2(1, 0)), 50);

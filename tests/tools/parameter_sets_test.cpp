@@ -77,6 +77,12 @@ TEST(GridSets, MultiplyTheVariantsOfAnExperiment) {
   ASSERT_EQ(swept.variants.size(), 4u);
   EXPECT_EQ(swept.variants[2].name, "firm.0001");
   EXPECT_THAT(settings_of(swept.variants[3]), ElementsAre("/k=9", "/a=2"));
+  // Each run has a folder of its own.
+  e.variants = {{"a", {}, {}}, {"a.b", {}, {}}};
+  EXPECT_THAT(refusal([&] {
+                with_parameter_sets(e, {{"b.c", {}, "sets.csv:2"}, {"c", {}, "sets.csv:3"}});
+              }),
+              HasSubstr("sets.csv:3: got two runs called 'a.b.c'"));
 }
 
 TEST_F(TableFile, HasARowPerRunAndKnowsItsLines) {

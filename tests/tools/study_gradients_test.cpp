@@ -35,7 +35,7 @@ TEST(SensitivityJudgement, OfAKnownResponse) {
   s.response.root = MatrixXd::Zero(3, 3);
   s.response.root(0, 0) = 3, s.response.root(0, 1) = -3, s.response.root(2, 2) = 0.02;
   SensitivityOptions options;
-  options.noise = 0.1, options.tracks = 4;
+  options.tracks.noise = 0.1, options.tracks.count = 4;
   judge(s, options, VectorXd(Vec3(1, 1, 0)));
   EXPECT_TRUE(s.has_gauge);
   EXPECT_EQ(s.directions.rank, 2);
@@ -120,6 +120,17 @@ TEST(Sensitivity, RefusesInOneLine) {
   EXPECT_THAT(error_of({"--set", "/time/frames=0"}), HasSubstr("frames"));
 }
 
+TEST(Sensitivity, HoldsOnlyWhatHasAnEffect) {
+  const StudyPlace place("sensitivity_held");
+  std::vector<std::string> arguments = {"--hold", "/base/stiffness"};
+  for (const char* knot : {"0", "1", "2"})  // the finger never touches
+    arguments.insert(arguments.end(),
+                     {"--set", std::string("/colliders/finger/path/") + knot + "/position/2=90"});
+  const StudyCall call = place.call("sensitivity", "scene.json", arguments);
+  EXPECT_EQ(call.code, 2);
+  EXPECT_THAT(call.err, HasSubstr("--hold: got '/base/stiffness', expected a parameter that has an effect"));
+}
+
 std::string swipes(const std::string& more = "") {
   return R"({"name": "swipes", "scene": "scene.json", "settings": ["/skin/surface/grid/cells=[4,3]"], "variants": [
     {"name": "along", "settings": []},
@@ -153,6 +164,12 @@ TEST(PlanStudy, RanksSwipesAndKeepsThem) {
   filmed.insert(filmed.end(), {"--filmed", "along"});
   const StudyCall next = place.call("plan", "swipes.json", filmed);
   EXPECT_THAT(next.out, HasSubstr("film next across ("));
+  // Named twice it is filmed once.
+  const std::string once =
+      place.text("out/swipes.csv") + place.text("out/pairs.csv") + place.text("out/order.csv");
+  filmed.insert(filmed.end(), {"--filmed", "along"});
+  EXPECT_EQ(place.call("plan", "swipes.json", filmed).code, 0);
+  EXPECT_EQ(place.text("out/swipes.csv") + place.text("out/pairs.csv") + place.text("out/order.csv"), once);
 }
 
 TEST(PlanStudy, RefusesInOneLine) {

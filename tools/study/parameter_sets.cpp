@@ -105,6 +105,7 @@ Experiment experiment_of_scene(const std::string& path) {
 Experiment with_parameter_sets(const Experiment& experiment, const std::vector<ParameterSet>& sets) {
   Experiment swept = experiment;
   swept.variants.clear();
+  std::set<std::string> names;  // of folders
   for (const Variant& v : experiment.variants)
     for (const ParameterSet& set : sets) {
       Variant run = v;
@@ -112,6 +113,9 @@ Experiment with_parameter_sets(const Experiment& experiment, const std::vector<P
       run.values = set.values;
       for (const SweptValue& value : set.values)
         run.settings.push_back({value.address + "=" + value.text, set.origin});
+      if (!names.insert(run.name).second)
+        throw InputError(set.origin, "two runs called '" + run.name + "'",
+                         "names that differ when joined by a dot");
       swept.variants.push_back(std::move(run));
     }
   return swept;

@@ -10,7 +10,7 @@
 #include "sim/core/parse_number.h"
 #include "sim/output/text.h"
 #include "sim/scene/load.h"
-#include "tools/study/study_run.h"
+#include "tools/polished_run.h"
 
 namespace rhytid::tools {
 namespace {
@@ -56,7 +56,9 @@ class Planning {
     if (plan_.swipes.empty()) return worst;
     for (const std::string& name : options_.filmed) {
       const auto at = std::find(plan_.swipes.begin(), plan_.swipes.end(), name);
-      if (at != plan_.swipes.end()) plan_.filmed.push_back(static_cast<int>(at - plan_.swipes.begin()));
+      const int swipe = static_cast<int>(at - plan_.swipes.begin());
+      const bool is_twice = std::find(plan_.filmed.begin(), plan_.filmed.end(), swipe) != plan_.filmed.end();
+      if (at != plan_.swipes.end() && !is_twice) plan_.filmed.push_back(swipe);
     }
     write_plan(folder_, experiment_, plan_, options_);
     context_.out << plan_text(plan_, options_) << "written to " << folder_
@@ -134,8 +136,8 @@ class Planning {
     const SceneModel scene_model(scene_of(v));
     std::string measure = "tangent";
     for (const std::string& address : addresses_) measure += " " + address;
-    if (options_.view)
-      for (const double x : *options_.view) measure += " " + exact_text(x);
+    if (options_.tracks.view)
+      for (const double x : *options_.tracks.view) measure += " " + exact_text(x);
     const VariantIdentity identity = study_identity(scene_model.scene(), scene_model.model(), measure);
     const std::string folder = folder_ + "/" + v.name;
     const auto n = static_cast<Eigen::Index>(addresses_.size());
@@ -170,7 +172,7 @@ class Planning {
         const SkinMesh& mesh = scene_model.model().mesh;
         const auto tangent = adjoint::tangent_sweep(scene_model.model(), scene_model.native(), *trajectory,
                                                     adjoint::OuterDisplacements(mesh), space.jacobian());
-        const MatrixXd root = adjoint::surface_response(mesh, tangent, options_.view).root;
+        const MatrixXd root = adjoint::surface_response(mesh, tangent, options_.tracks.view).root;
         add_root(root, result);
         add(v, root);
       }
@@ -188,7 +190,7 @@ class Planning {
 
   void add(const Variant& v, const MatrixXd& root) {
     plan_.swipes.push_back(v.name);
-    plan_.roots.push_back(std::sqrt(static_cast<double>(options_.tracks)) / options_.noise * root);
+    plan_.roots.push_back(options_.tracks.weight() * root);
   }
 
   VerbContext& context_;

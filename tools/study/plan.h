@@ -3,13 +3,13 @@
 // Tests: tests/tools/study_gradients_test.cpp; the criteria: tests/adjoint/design_test.cpp
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "adjoint/design.h"
 #include "sim/scene/parameter.h"
 #include "tools/study/experiment.h"
+#include "tools/study/study_run.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -17,12 +17,10 @@ namespace rhytid::tools {
 struct PlanOptions {
   std::vector<std::string> only;       ///< swipes; empty = all
   std::vector<std::string> addresses;  ///< empty = all that all swipes have, with the same value
-  double noise = 0.01;                 ///< mm, of each component of a track in each frame
-  int tracks = 200;                    ///< spread evenly over the outer surface
-  std::optional<Vec3> view;            ///< what moves along it is not seen
-  double prior = 1;                    ///< standard deviation of every coordinate before any footage
-  std::vector<std::string> priors;     ///< "ADDRESS=deviation", in place of that
-  std::vector<std::string> filmed;     ///< swipes that have been filmed already
+  PredictedTracks tracks;
+  double prior = 1;                 ///< standard deviation of every coordinate before any footage
+  std::vector<std::string> priors;  ///< "ADDRESS=deviation", in place of that
+  std::vector<std::string> filmed;  ///< swipes that have been filmed already
   bool anew = false;
 };
 

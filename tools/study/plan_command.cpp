@@ -1,9 +1,9 @@
 // rhytid study plan: which swipe to film next.
 #include <CLI/CLI.hpp>
 
-#include "sim/core/error.h"
 #include "tools/study/plan.h"
 #include "tools/study/study_command.h"
+#include "tools/study/study_run.h"
 
 namespace rhytid::tools {
 namespace {
@@ -22,8 +22,7 @@ class PlanCommand final : public StudyCommand {
         "that were run are kept; noise, tracks and priors may change without running them again.",
         "experiment.json and its scene; parameters have the same values in all its variants",
         "plan.txt, swipes.csv, pairs.csv, order.csv, posterior.svg, index.html, a folder per swipe. Prints "
-        "the "
-        "text",
+        "the text",
         "rhytid study plan data/scenes/demo_swipes/experiment.json -o run/plan"};
   }
   bool is_of_experiments() const override { return true; }
@@ -42,15 +41,7 @@ class PlanCommand final : public StudyCommand {
                    "have the same value in all swipes)")
         ->allow_extra_args(false)
         ->option_text("ADDRESS");
-    app.add_option("--noise", options_.noise, "of each component of a track in each frame, mm (default 0.01)")
-        ->check(CLI::PositiveNumber)
-        ->option_text("MM");
-    app.add_option("--tracks", options_.tracks, "tracks spread evenly over the surface (default 200)")
-        ->check(CLI::Range(1, 100000000))
-        ->option_text("N");
-    app.add_option("--view", view_, "direction of sight: motion along it is not seen (default: all is)")
-        ->expected(3)
-        ->option_text("X Y Z");
+    add_track_options(app, options_.tracks);
     app.add_option("--prior", options_.prior, "standard deviation of every coordinate before (default 1)")
         ->check(CLI::PositiveNumber)
         ->option_text("SD");
@@ -61,16 +52,11 @@ class PlanCommand final : public StudyCommand {
   }
 
   ExitCode study(VerbContext& context) override {
-    if (!view_.empty()) {
-      options_.view = Vec3(view_[0], view_[1], view_[2]);
-      if (!(options_.view->norm() > 0)) throw InputError("--view", "0 0 0", "a direction");
-    }
     return run_plan(context, load_experiment(context.options.file, size()), options_);
   }
 
  private:
   PlanOptions options_;
-  std::vector<double> view_;
 };
 
 }  // namespace

@@ -50,12 +50,6 @@ std::string deviation_text(double deviation) {
   return deviation < 0.3 ? short_text(100 * deviation, 2) + " %" : "x " + short_text(std::exp(deviation), 2);
 }
 
-std::string assumption(const PlanOptions& options) {
-  return std::to_string(options.tracks) + " tracks spread evenly over the surface, in every frame, noise " +
-         short_text(options.noise) + " mm per component" +
-         (options.view ? ", seen along one direction." : ", in three dimensions.");
-}
-
 double bits(const Plan& plan, const Row& row) {
   return adjoint::information_gain_bits(row.posterior, plan.priors);
 }
@@ -146,7 +140,7 @@ std::string plan_text(const Plan& plan, const PlanOptions& options) {
     table.add(std::move(cells));
   }
   table.add(information), table.add(D), table.add(A);
-  std::string text = "Predicted: " + assumption(options) + "\n\n" + table.text() + "\n";
+  std::string text = "Predicted: " + options.tracks.text() + "." + "\n\n" + table.text() + "\n";
   for (const std::string& line : recommendations(plan)) text += line + "\n";
   for (const std::string& line : plan.left_out) text += "Left out: " + line + "\n";
   return text;
@@ -161,7 +155,7 @@ void write_plan(const std::string& folder, const Experiment& experiment, const P
 
   HtmlPage page("What to film: " + experiment.name, experiment.description);
   page.section("next", "What to film next");
-  page.paragraph("Predicted to first order, at the scene's own values: " + assumption(options));
+  page.paragraph("Predicted to first order, at the scene's own values: " + options.tracks.text() + ".");
   page.list(recommendations(plan));
   for (const std::string& line : plan.left_out) page.note("Left out: " + line);
   page.section("posterior", "What each swipe would tell");

@@ -5,9 +5,11 @@
 #include <limits>
 #include <ostream>
 
+#include "adjoint/ligament_gradient.h"
 #include "adjoint/parameter_space.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
+#include "tools/polished_run.h"
 #include "tools/study/sensitivity_report.h"
 #include "tools/study/study_run.h"
 
@@ -85,9 +87,8 @@ void add_map(Sensitivity& s, const SceneModel& scene_model, const Trajectory& ru
   }
   if (scene_model.ligaments() == nullptr) return;
   const auto gradient = adjoint::adjoint_sweep(model, scene_model.native(), run, mean, weights);
-  const NativeBlock& block = model.native_block("ligaments/b");
-  s.b = model.native.segment(block.offset, block.size);
-  s.dJ_db = gradient.native_bar.segment(block.offset, block.size);
+  s.b = adjoint::ligament_gradient(model, model.native);
+  s.dJ_db = adjoint::ligament_gradient(model, gradient.native_bar);
   s.area = adjoint::column_areas(model.mesh, false);
   constexpr double mm2_per_cm2 = 100;
   s.share = mm2_per_cm2 / s.figure * s.b.cwiseProduct(s.dJ_db).cwiseQuotient(s.area);
@@ -99,7 +100,7 @@ void judge(Sensitivity& s, const SensitivityOptions& options, const std::optiona
   const auto n = static_cast<Eigen::Index>(s.parameters.size());
   std::vector<std::string> names;
   for (const ParameterSpec& spec : s.parameters) names.push_back(spec.name);
-  const MatrixXd whitened = std::sqrt(static_cast<double>(options.tracks)) / options.noise * s.response.root;
+  const MatrixXd whitened = options.tracks.weight() * s.response.root;
   s.directions = adjoint::directions_of(whitened);
   s.has_gauge = gauge && adjoint::lead_null_space(s.directions, *gauge);
   s.deviations = deviations_of(s.directions);
@@ -170,9 +171,11 @@ ExitCode run_sensitivity(VerbContext& context, const SensitivityOptions& options
     std::vector<int> kept;
     drop_without_effect(s, space.specs(), tangent, kept);
     for (MatrixXd& frame : tangent.frames) frame = frame(Eigen::all, kept).eval();
+    if (std::find(s.without_effect.begin(), s.without_effect.end(), used.hold) != s.without_effect.end())
+      throw InputError("--hold", "'" + options.hold + "'", "a parameter that has an effect");
     if (kept.empty())
       throw InputError(context.options.file, "parameters without any effect", "a scene that moves");
-    s.response = adjoint::surface_response(model.mesh, tangent, options.view);
+    s.response = adjoint::surface_response(model.mesh, tangent, options.tracks.view);
     // What has no effect may have part in the gauge, and is left out of it without loss.
     std::optional<VectorXd> gauge = adjoint::gauge_coordinates(model, space.jacobian());
     if (gauge) gauge = VectorXd((*gauge)(kept));

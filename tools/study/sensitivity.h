@@ -11,6 +11,7 @@
 #include "adjoint/surface_response.h"
 #include "sim/scene/parameter.h"
 #include "tools/study/experiment.h"
+#include "tools/study/study_run.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -19,11 +20,9 @@ struct SensitivityOptions {
   StudySize size = StudySize::quick;
   std::string variant;                 ///< of an experiment; empty = the first
   std::vector<std::string> addresses;  ///< empty = all of the scene
-  double noise = 0.01;                 ///< mm, of each component of a track in each frame
-  int tracks = 200;                    ///< spread evenly over the outer surface
-  std::string hold;                    ///< address taken as known; empty = the modulus of the softest layer
-  std::optional<Vec3> view;            ///< what moves along it is not seen
-  bool map_all_frames = false;         ///< the map's figure is the mean over frames, not that of the last
+  PredictedTracks tracks;
+  std::string hold;             ///< address taken as known; empty = the modulus of the softest layer
+  bool map_all_frames = false;  ///< the map's figure is the mean over frames, not that of the last
 };
 
 /// The tables of a study, before they are written.

@@ -1,9 +1,9 @@
 // rhytid study sensitivity: what the parameters of a scene do to its surface, from one run.
 #include <CLI/CLI.hpp>
 
-#include "sim/core/error.h"
 #include "tools/study/sensitivity.h"
 #include "tools/study/study_command.h"
+#include "tools/study/study_run.h"
 
 namespace rhytid::tools {
 namespace {
@@ -36,35 +36,22 @@ class SensitivityCommand final : public StudyCommand {
         ->option_text("ADDRESS");
     app.add_option("--variant", options_.variant, "of an experiment (default: the first)")
         ->option_text("NAME");
-    app.add_option("--noise", options_.noise, "of each component of a track in each frame, mm (default 0.01)")
-        ->check(CLI::PositiveNumber)
-        ->option_text("MM");
-    app.add_option("--tracks", options_.tracks, "tracks spread evenly over the surface (default 200)")
-        ->check(CLI::Range(1, 100000000))
-        ->option_text("N");
+    add_track_options(app, options_.tracks);
     app.add_option("--hold", options_.hold,
                    "parameter taken as known (default: the modulus of the softest layer, when scaling all "
                    "stiffnesses together moves nothing)")
         ->option_text("ADDRESS");
-    app.add_option("--view", view_, "direction of sight: motion along it is not seen (default: all is)")
-        ->expected(3)
-        ->option_text("X Y Z");
     app.add_flag("--all-frames", options_.map_all_frames,
                  "the map's figure is the mean over all frames, not that of the last");
   }
 
   ExitCode study(VerbContext& context) override {
     options_.size = size();
-    if (!view_.empty()) {
-      options_.view = Vec3(view_[0], view_[1], view_[2]);
-      if (!(options_.view->norm() > 0)) throw InputError("--view", "0 0 0", "a direction");
-    }
     return run_sensitivity(context, options_);
   }
 
  private:
   SensitivityOptions options_;
-  std::vector<double> view_;
 };
 
 }  // namespace

@@ -47,11 +47,6 @@ std::vector<int> strongest_first(const Sensitivity& s) {
   return order;
 }
 
-std::string observed_text(const SensitivityOptions& options) {
-  return std::to_string(options.tracks) + " tracks spread evenly over the surface, in every frame, noise " +
-         short_text(options.noise) + " mm per component" + (options.view ? ", seen along one direction" : "");
-}
-
 std::string figure_name(const SensitivityOptions& options) {
   return options.map_all_frames ? "mean square displacement of the outer surface over all frames"
                                 : "mean square displacement of the outer surface in the last frame";
@@ -162,8 +157,8 @@ std::string json_text(const Sensitivity& s, const SensitivityOptions& options) {
                           {"vector", list(VectorXd(s.directions.right_vectors.col(i)))}});
   }
   const ordered_json all = {
-      {"noise_mm", options.noise},
-      {"tracks", options.tracks},
+      {"noise_mm", options.tracks.noise},
+      {"tracks", options.tracks.count},
       {"parameters", parameters},
       {"without_effect", s.without_effect},
       {"rank", s.directions.rank},
@@ -252,7 +247,7 @@ std::string sensitivity_text(const Sensitivity& s, const SensitivityOptions& opt
   std::string text =
       "Motion of the surface per unit of log or logit coordinate, and predicted deviations (of parameters,\n"
       "of the odds of fractions) from " +
-      observed_text(options) + "\n\n" + table.text() + "\n";
+      options.tracks.text() + "\n\n" + table.text() + "\n";
   if (!s.without_effect.empty()) {
     text += "Without effect:";
     for (const std::string& address : s.without_effect) text += " " + address;
@@ -291,7 +286,7 @@ void write_sensitivity(const std::string& folder, const SceneModel& scene_model,
       "How far a unit of each coordinate moves the outer surface (log parameters: a unit is a "
       "factor e, so 10 % more is a tenth of it), to first order, as rms and largest value over "
       "surface and frames. Predicted standard deviations for " +
-      observed_text(options) + ": with all parameters free, and with " +
+      options.tracks.text() + ": with all parameters free, and with " +
       (s.held >= 0 ? s.parameters[s.held].name + " known." : "none known."));
   page.table(parameter_table(s));
   page.svg_figure(plot, "rms and largest motion per parameter",

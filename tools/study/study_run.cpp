@@ -1,14 +1,15 @@
 #include "tools/study/study_run.h"
 
+#include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
-#include "adjoint/certificate.h"
 #include "sim/core/digest.h"
 #include "sim/core/error.h"
 #include "sim/core/parse_number.h"
 #include "sim/output/picture.h"
+#include "sim/output/text.h"
 #include "sim/scene/load.h"
 #include "sim/time/model_digest.h"
 #include "sim/time/program_digest.h"
@@ -78,27 +79,6 @@ VariantIdentity study_identity(const Scene& scene, const Model& model, const std
   return {of_scene.hex(), of_measure.hex(), content_digest(model), program_digest()};
 }
 
-std::optional<Trajectory> polished_run(const SceneModel& scene_model, Progress& progress, ExitCode& code) {
-  RunOptions options = scene_model.run_options();
-  options.minimiser = adjoint::certificate_minimiser(options.minimiser);
-  progress.stage("simulation", options.frames);
-  RunObserver observer;
-  observer.iteration = [&](int, double, int iteration, double, double residual) {
-    progress.iteration(iteration, residual);
-    return !progress.interrupted();
-  };
-  observer.step = [&](const StepEvent& event) {
-    if (event.frame_done && event.record.frame > 0) progress.step_done(event.record.frame);
-  };
-  Trajectory run = simulate(scene_model.model(), scene_model.native(), options, observer);
-  progress.finish();
-  if (run.complete) return run;
-  code = progress.interrupted() ? ExitCode::interrupted : ExitCode::not_converged;
-  if (code == ExitCode::not_converged)
-    progress.error("the run has no gradient, since it did not reach its last frame: " + run.failure);
-  return std::nullopt;
-}
-
 std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vector<std::string>& addresses) {
   std::vector<ParameterSpec> specs;
   if (addresses.empty()) {
@@ -114,6 +94,30 @@ std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vecto
         throw InputError("--parameter", "'" + address + "' a second time", "each parameter once");
   }
   return specs;
+}
+
+std::string PredictedTracks::text() const {
+  return std::to_string(count) + " tracks spread evenly over the surface, in every frame, noise " +
+         short_text(noise) + " mm per component" +
+         (view ? ", seen along one direction" : ", in three dimensions");
+}
+
+void add_track_options(CLI::App& app, PredictedTracks& tracks) {
+  app.add_option("--noise", tracks.noise, "of each component of a track in each frame, mm (default 0.01)")
+      ->check(CLI::PositiveNumber)
+      ->option_text("MM");
+  app.add_option("--tracks", tracks.count, "tracks spread evenly over the surface (default 200)")
+      ->check(CLI::Range(1, 100000000))
+      ->option_text("N");
+  app.add_option_function<std::vector<double>>(
+         "--view",
+         [&tracks](const std::vector<double>& view) {
+           tracks.view = Vec3(view[0], view[1], view[2]);
+           if (!(tracks.view->norm() > 0)) throw InputError("--view", "0 0 0", "a direction");
+         },
+         "direction of sight: motion along it is not seen (default: all is)")
+      ->expected(3)
+      ->option_text("X Y Z");
 }
 
 std::string file_name(const std::string& text) {

@@ -1,7 +1,8 @@
-// What all studies share: the scene that they work on, shards of their runs, when a result is out of date,
-// and the polished run that derivatives are taken of.
+// What all studies share: the scene that they work on, shards of their runs, when a result is out of date, what
+// predicted tracks see, and pictures of the skin.
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,14 +41,23 @@ StudyScene load_study_scene(VerbContext& context, StudySize size, const std::str
 /// What a result of this scene depends on, the measure beside it.
 VariantIdentity study_identity(const Scene& scene, const Model& model, const std::string& measure);
 
-/// A run that can be differentiated (tight tolerance and a polish, states kept), with progress. Nothing when
-/// it was interrupted or did not reach its last frame; `code` then says which, and the reason is on stderr.
-std::optional<Trajectory> polished_run(const SceneModel& scene_model, Progress& progress, ExitCode& code);
-
 /// Names as addresses of `scene`, or when empty all that the scene has but places (of sources, of knots of
-/// paths), which per cents say nothing of. Throws InputError for one that it has
-/// not, or that is given twice.
+/// paths), which per cents say nothing of. Throws InputError for one that it has not, or that is given twice.
 std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vector<std::string>& addresses);
+
+/// Tracks that a study predicts with, spread evenly over the outer surface and seen in every frame.
+struct PredictedTracks {
+  double noise = 0.01;  ///< mm, of each component of a track in each frame
+  int count = 200;
+  std::optional<Vec3> view;  ///< direction of sight: what moves along it is not seen
+  /// What adjoint::SurfaceResponse::root is multiplied by to be whitened, 1/mm.
+  double weight() const { return std::sqrt(static_cast<double>(count)) / noise; }
+  /// "200 tracks spread evenly ...", without a full stop.
+  std::string text() const;
+};
+
+/// Options --noise, --tracks and --view. CLI11 writes into `tracks`, which must live as long as `app`.
+void add_track_options(CLI::App& app, PredictedTracks& tracks);
 
 /// A name for files: letters, digits and _ . - stay, the rest becomes _.
 std::string file_name(const std::string& text);

@@ -19,8 +19,8 @@ class BasePart final : public ScenePart {
                       VectorXd& derivative) const override;
 };
 
-/// Smallest and largest gap between the inner surface at rest and the base, mm, over the points of contact; both
-/// are subtracted there, so that rest is an equilibrium. Needs the terms of a BasePart in the model.
+/// Smallest and largest gap between the inner surface at rest and the base, mm, over the points of contact.
+/// It is subtracted there, so that rest is an equilibrium. Throws ContractError for a model without a base.
 std::pair<double, double> base_rest_gaps(const Model& model);
 
 }  // namespace rhytid

@@ -15,8 +15,8 @@ namespace rhytid {
 
 namespace {
 
-/// Instantaneous shear modulus and bulk modulus from Young's modulus and Poisson's ratio (the publication, eq. of μ
-/// and K).
+/// Instantaneous shear modulus and bulk modulus from Young's modulus and Poisson's ratio (the
+/// publication, eq. of μ and K).
 double shear_modulus(const LayerScene& l) {
   return l.youngs_modulus / (2 * (1 + l.poissons_ratio));
 }
