@@ -41,9 +41,18 @@ ReverseStates::ReverseStates(const Model& model, const VectorXd& native, const T
   kept_.push_back({0, first_state(run)});
   report_.state_bytes =
       sizeof(double) * (static_cast<std::size_t>(run.initial.u.size()) + model.history_size());
+  std::size_t in_use = 3;
+  for (const StepRecord& record : run.steps) in_use = std::max(in_use, 3 + record.earlier_passes.size());
   const std::size_t states = budget / report_.state_bytes;
   const auto useful = static_cast<long>(run.steps.size());
-  report_.slots = states <= 2 ? 0 : static_cast<long>(std::min<std::size_t>(states - 2, useful));
+  report_.slots = states <= in_use ? 0 : static_cast<long>(std::min<std::size_t>(states - in_use, useful));
+}
+
+void ReverseStates::count(const SharedState& state, std::size_t more) {
+  // Those of the run itself have no owner here.
+  const bool is_apart = state.use_count() > 0 && state != kept_.back().state;
+  const std::size_t held = kept_.size() - 1 + (last_.expired() ? 0 : 1) + (is_apart ? 1 : 0) + more;
+  report_.held_bytes = std::max(report_.held_bytes, report_.state_bytes * held);
 }
 
 SharedState ReverseStates::after(int steps) {
@@ -61,13 +70,16 @@ SharedState ReverseStates::after(int steps) {
     for (; at < target; ++at) {
       const StepRecord& record = run_->steps[static_cast<std::size_t>(at)];
       StepPasses passes(*model_, *native_, record.step, *state, record.earlier_passes);
+      count(state, record.earlier_passes.size() + 1);
       state = recomputed(record, passes);
       ++report_.recomputed_steps;
     }
     if (at < steps) kept_.push_back({at, state});
   }
-  // Those kept, this one, and the one after it that the caller still has.
-  report_.held_bytes = std::max(report_.held_bytes, report_.state_bytes * (kept_.size() - 1 + 2));
+  // The caller goes through the passes of the step that starts here.
+  const auto next = static_cast<std::size_t>(steps);
+  count(state, next < run_->steps.size() ? run_->steps[next].earlier_passes.size() : 0);
+  last_ = state;
   return state;
 }
 

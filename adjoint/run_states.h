@@ -30,7 +30,9 @@ struct CheckpointReport {
   long slots = 0;               ///< states that could be kept at a time
   long recomputed_steps = 0;    ///< advances; 0 when the run kept its histories
   std::size_t state_bytes = 0;  ///< of one state, displacement and history
-  std::size_t held_bytes = 0;   ///< of all states held at one time, at most; 0 when the run kept them
+  /// Of all states held at one time, at most, those of the caller and of the passes of a step among them; 0
+  /// when the run kept them.
+  std::size_t held_bytes = 0;
 };
 
 /// The states of a run from the last to the first. Where the run dropped its histories, as many states are
@@ -38,10 +40,13 @@ struct CheckpointReport {
 class ReverseStates {
  public:
   static constexpr std::size_t unlimited = std::numeric_limits<std::size_t>::max();
-  /// `budget` in bytes, for all states held at one time, two in use among them. With less than those two
-  /// take, nothing is kept but the start of the run. Model, native and run must outlive it.
+  /// `budget` in bytes, for all states held at one time. Three of them are in use while a state is recomputed
+  /// (the caller's, the one before the step and the one after it), and one more for every earlier pass of a
+  /// step. With less than those take, nothing is kept but the start of the run. Model, native and run must
+  /// outlive it.
   ReverseStates(const Model& model, const VectorXd& native, const Trajectory& run, std::size_t budget);
-  /// The state after `steps` steps; from call to call `steps` must not rise.
+  /// The state after `steps` steps; from call to call `steps` must not rise. The caller holds no more than
+  /// this one and the one before.
   SharedState after(int steps);
   const CheckpointReport& report() const { return report_; }
 
@@ -50,10 +55,14 @@ class ReverseStates {
     int steps;
     SharedState state;
   };
+  /// Notes that `state`, which may be kept, is held beside all kept ones, the caller's and `more` others.
+  void count(const SharedState& state, std::size_t more);
+
   const Model* model_;
   const VectorXd* native_;
   const Trajectory* run_;
-  std::vector<Kept> kept_;  ///< ascending; the start of the run first
+  std::vector<Kept> kept_;           ///< ascending; the start of the run first
+  std::weak_ptr<const State> last_;  ///< what the caller got; empty for a state of the run
   CheckpointReport report_;
 };
 

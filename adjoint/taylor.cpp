@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "adjoint/output_values.h"
+#include "adjoint/run_states.h"
 #include "sim/core/error.h"
 #include "sim/time/step_passes.h"
 
@@ -73,9 +74,11 @@ FunctionalDifference::FunctionalDifference(const SceneModel& scene_model, const 
           "FunctionalDifference: weights for every frame");
   const VectorXd native = scene_model.native();
   values_ = output_values(model(), native, run, output);
+  SharedState old = first_state(run);
   for (int i = 0; i < static_cast<int>(run.steps.size()); ++i) {
-    StepPasses passes(model(), native, run.steps[i].step, run.before(i), run.steps[i].earlier_passes);
+    StepPasses passes(model(), native, run.steps[i].step, *old, run.steps[i].earlier_passes);
     regimes_.push_back(step_regimes(passes.last(), run.steps[i].state.u));
+    old = state_after(run, i, passes);
   }
 }
 

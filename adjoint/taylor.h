@@ -48,7 +48,8 @@ struct TaylorSeries {
 /// Q = Σ_f w_f · q_f as a function of coordinates, relative to its value at the nominal run.
 class FunctionalDifference {
  public:
-  /// `run` must be complete with states; all arguments must outlive it.
+  /// `run` must be complete with states, histories that it dropped are recomputed; all arguments must outlive
+  /// it.
   FunctionalDifference(const SceneModel& scene_model, const Trajectory& run, const Output& output,
                        const std::vector<VectorXd>& weights, const MinimiserOptions& minimiser);
 
