@@ -89,18 +89,20 @@ SurfaceResponse surface_response(const SkinMesh& mesh, const TangentResult& tang
   r.largest = VectorXd::Zero(n);
   r.rms_of_frame = MatrixXd::Zero(frames, n);
   r.last = MatrixXd::Zero(columns, n);
-  const Mat3 seen = view ? Mat3(Mat3::Identity() - view->normalized() * view->normalized().transpose())
-                         : Mat3(Mat3::Identity());
+  const Mat3 seen =
+      view ? Mat3(Mat3::Identity() - view->stableNormalized() * view->stableNormalized().transpose())
+           : Mat3(Mat3::Identity());
   for (Eigen::Index f = 1; f <= frames; ++f) {
     require(tangent.frames[f].rows() == 3 * columns, "surface_response: not a tangent of OuterDisplacements");
     MatrixXd du = tangent.frames[f];
     for (Eigen::Index c = 0; c < columns; ++c) {
-      if (view) du.middleRows<3>(3 * c) = seen * du.middleRows<3>(3 * c).eval();
       r.last.row(c) = du.middleRows<3>(3 * c).colwise().norm();  // of frame f: overwritten by later ones
       r.largest = r.largest.cwiseMax(r.last.row(c).transpose());
       du.middleRows<3>(3 * c) *= root_weights[c];
     }
     r.rms_of_frame.row(f - 1) = du.colwise().norm();
+    for (Eigen::Index c = 0; view && c < columns; ++c)
+      du.middleRows<3>(3 * c) = seen * du.middleRows<3>(3 * c).eval();
     r.root = stacked_root(r.root, du);
   }
   r.rms = (r.rms_of_frame.colwise().squaredNorm() / static_cast<double>(frames)).cwiseSqrt().transpose();

@@ -52,7 +52,8 @@ class MeanSquareDisplacement final : public Output {
 /// Tangents of OuterDisplacements along n directions, summed up.
 struct SurfaceResponse {
   /// [n][n] upper triangular with RᵀR = Σ_frames ⟨duᵀ du⟩: the Jacobian of N tracks spread evenly over the
-  /// surface, each with noise σ in every component and frame, has the singular values of √N/σ R.
+  /// surface, each with noise σ in every component and frame, has the singular values of √N/σ R. With a view
+  /// only what is seen counts, here and nowhere else.
   MatrixXd root;
   VectorXd rms;           ///< [n] over surface and frames 1.., mm per unit of the direction
   VectorXd largest;       ///< [n] over nodes and frames, mm
@@ -60,8 +61,8 @@ struct SurfaceResponse {
   MatrixXd last;          ///< [columns][n] |du| in the last frame
 };
 
-/// `tangent` is that of OuterDisplacements(mesh, 1). With `view`, what moves along it does not count (a
-/// camera far away that looks along it).
+/// `tangent` is that of OuterDisplacements(mesh, 1). With `view`, what moves along it does not count for `root`
+/// (a camera far away that looks along it); all other figures are those of the whole displacement.
 SurfaceResponse surface_response(const SkinMesh& mesh, const TangentResult& tangent,
                                  const std::optional<Vec3>& view = std::nullopt);
 

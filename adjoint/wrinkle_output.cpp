@@ -40,17 +40,14 @@ WrinkleDescription::WrinkleDescription(SurfaceSamples samples, const WrinkleBand
 }
 
 MatrixXd WrinkleDescription::waves(const VectorXd& u) const {
-  const MatrixXd heights = samples_.heights(u);
-  if (samples_.columns() == 1) return band_pass(VectorXd(heights.col(0)), samples_.spacing(), band_);
-  return band_pass(heights, samples_.spacing(), band_);
+  return band_pass(samples_.heights(u), samples_.spacing(), band_);
 }
 
 VectorXd WrinkleDescription::values(int frame, const State& state) const {
   VectorXd out = VectorXd::Zero(size(frame));
   if (out.size() == 0) return out;
   const MatrixXd b = waves(state.u);
-  const WrinkleSums sums = samples_.columns() == 1 ? wrinkle_sums(VectorXd(b.col(0)), samples_.spacing())
-                                                   : wrinkle_sums(b, samples_.spacing());
+  const WrinkleSums sums = wrinkle_sums(b, samples_.spacing());
   const WrinkleDescriptors d = describe(sums);
   if (d.amplitude == 0) return out;
   out[0] = d.amplitude;
@@ -62,8 +59,7 @@ VectorXd WrinkleDescription::values(int frame, const State& state) const {
 void WrinkleDescription::add_gradient(const VectorXd& u, const VectorXd& weights, VectorXd& u_bar) const {
   const MatrixXd b = waves(u);
   const double spacing = samples_.spacing();
-  const bool is_line = samples_.columns() == 1;
-  const WrinkleSums sums = is_line ? wrinkle_sums(VectorXd(b.col(0)), spacing) : wrinkle_sums(b, spacing);
+  const WrinkleSums sums = wrinkle_sums(b, spacing);
   const WrinkleDescriptors d = describe(sums);
   if (d.amplitude == 0) return;
   const WrinkleSums bar = by_sums(sums, d, weights);

@@ -118,6 +118,7 @@ WrinkleSums wrinkle_sums(const VectorXd& b, double spacing) {
 }
 
 WrinkleSums wrinkle_sums(const MatrixXd& b, double spacing) {
+  if (b.cols() == 1) return wrinkle_sums(VectorXd(b.col(0)), spacing);
   WrinkleSums sums;
   const double area = spacing * spacing;
   for (Eigen::Index j = 2; j + 2 < b.cols(); ++j)

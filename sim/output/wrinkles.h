@@ -54,7 +54,7 @@ struct WrinkleSums {
   Eigen::Matrix2d gradient = Eigen::Matrix2d::Zero();  ///< ∫∇b ∇bᵀ; along a line only (0, 0)
 };
 WrinkleSums wrinkle_sums(const VectorXd& band_passed, double spacing);
-/// Points whose derivatives need one that is not on the surface do not count.
+/// Points whose derivatives need one that is not on the surface do not count. One column is a line.
 WrinkleSums wrinkle_sums(const MatrixXd& band_passed, double spacing);
 
 /// Derivative of Σ bar · sums by the band-passed heights, [nx][ny] (one column: a line); NaN beside the

@@ -177,6 +177,16 @@ TEST(WrinkleDescription, BandPassAndSamplesHaveTransposes) {
                               (2 * e);
     EXPECT_NEAR(dot(wrinkle_sums_transpose(h, 0.5, bar), direction), difference,
                 1e-5 * std::fabs(difference) + 1e-4);
+    // One column is a line, in the sums and in their transpose.
+    const MatrixXd column = line, along = weights;
+    EXPECT_EQ(wrinkle_sums(column, 0.5).square, wrinkle_sums(line, 0.5).square);
+    EXPECT_EQ(band_pass(column, 0.5, band), band_pass(line, 0.5, band));
+    const double of_line = (value(wrinkle_sums(MatrixXd(column + e * along), 0.5)) -
+                            value(wrinkle_sums(MatrixXd(column - e * along), 0.5))) /
+                           (2 * e);
+    EXPECT_NEAR(dot(wrinkle_sums_transpose(column, 0.5, bar), along), of_line,
+                1e-5 * std::fabs(of_line) + 1e-4);
+    EXPECT_GT(std::fabs(of_line), 0.1);
   }
   const SurfaceSamples window(drag().model().mesh, SampleWindow{.size = {18, 10}}, 1);
   ASSERT_GT(window.missing(), 0);

@@ -96,10 +96,17 @@ TEST(SurfaceResponse, HasTheFiguresOfItsRows) {
   EXPECT_NEAR(square(0, 0), 9, 1e-12);
   EXPECT_NEAR(square(0, 1), 0, 1e-12);
   EXPECT_NEAR(square(1, 1), 16 + 9 * share, 1e-12);
-  // Seen along z, the second parameter moves that node alone.
-  const SurfaceResponse seen = surface_response(mesh, tangent, Vec3(0, 0, -2));
-  EXPECT_NEAR(seen.rms[0], r.rms[0], 1e-12);
-  EXPECT_NEAR(seen.rms_of_frame(1, 1), 3 * std::sqrt(share), 1e-12);
+  // Seen along z, the second parameter moves that node alone; how far it moves is as before.
+  for (const double length : {2.0, 1e-200, 1e200}) {
+    const SurfaceResponse seen = surface_response(mesh, tangent, Vec3(0, 0, -length));
+    const MatrixXd seen_square = seen.root.transpose() * seen.root;
+    EXPECT_NEAR(seen_square(0, 0), 9, 1e-12);
+    EXPECT_NEAR(seen_square(1, 1), 9 * share, 1e-12) << length;
+    EXPECT_EQ(seen.rms, r.rms);
+    EXPECT_EQ(seen.largest, r.largest);
+    EXPECT_EQ(seen.rms_of_frame, r.rms_of_frame);
+    EXPECT_EQ(seen.last, r.last);
+  }
 }
 
 TEST(SurfaceResponse, OfARunCannotTellAllStiffnessesTogether) {
