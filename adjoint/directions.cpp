@@ -18,7 +18,7 @@ constexpr double kOpen = 1e-6;
 /// Components of a direction below this part of its largest one are left out of sentences.
 constexpr double kMentioned = 0.3;
 /// And so are all beyond this many; the sentence then says how many they are.
-constexpr int kMentionedAtMost = 8;
+constexpr std::size_t kMentionedAtMost = 8;
 
 /// The sign of a singular vector is free: makes the largest component of each column from `first` on positive.
 void choose_signs(MatrixXd& columns, Eigen::Index first) {
@@ -27,6 +27,17 @@ void choose_signs(MatrixXd& columns, Eigen::Index first) {
     columns.col(i).cwiseAbs().maxCoeff(&largest);
     if (columns(largest, i) < 0) columns.col(i) *= -1;
   }
+}
+
+/// Components that are not far below the largest, largest first.
+std::vector<int> large_components(const VectorXd& direction) {
+  std::vector<int> order(direction.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return std::fabs(direction[a]) > std::fabs(direction[b]); });
+  const double least = kMentioned * direction.cwiseAbs().maxCoeff();
+  std::erase_if(order, [&](int k) { return std::fabs(direction[k]) < least; });
+  return order;
 }
 
 }  // namespace
@@ -74,25 +85,22 @@ bool lead_null_space(Directions& d, const VectorXd& direction) {
   return true;
 }
 
+std::vector<int> named_components(const VectorXd& direction) {
+  std::vector<int> named = large_components(direction);
+  if (named.size() > kMentionedAtMost) named.resize(kMentionedAtMost);
+  return named;
+}
+
 std::string direction_in_words(const VectorXd& direction, const std::vector<std::string>& names) {
-  std::vector<int> order(direction.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return std::fabs(direction[a]) > std::fabs(direction[b]); });
+  const std::vector<int> named = named_components(direction);
   std::string up, down;
-  int mentioned = 0, more = 0;
-  for (const int k : order) {
-    if (std::fabs(direction[k]) < kMentioned * std::fabs(direction[order.front()])) break;
-    if (mentioned == kMentionedAtMost) {
-      ++more;
-      continue;
-    }
+  for (const int k : named) {
     std::string& list = direction[k] > 0 ? up : down;
     list += (list.empty() ? "" : ", ") + names[k];
-    ++mentioned;
   }
+  const std::size_t more = large_components(direction).size() - named.size();
   if (more > 0) (down.empty() ? up : down) += " and " + std::to_string(more) + " more";
-  if (mentioned == 1) return up + " is not determined: changing it";
+  if (named.size() == 1) return up + " is not determined: changing it";
   if (down.empty()) return up + " go together: raising all of them";
   return up + " trade off against " + down + ": raising the former while lowering the latter";
 }

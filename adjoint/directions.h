@@ -32,6 +32,10 @@ Directions directions_of(const MatrixXd& jacobian);
 /// false when it is not.
 bool lead_null_space(Directions& directions, const VectorXd& direction);
 
+/// The components of a direction that its words name, largest first: not those below 0.3 of the largest, and
+/// eight at most.
+std::vector<int> named_components(const VectorXd& direction);
+
 /// A direction as the words of a sentence: "a, b trade off against c: raising the former while lowering the
 /// latter", "a, b go together: raising all of them", "a is not determined: changing it". Components below
 /// 0.3 of the largest are left out, and all beyond eight are counted only.

@@ -4,23 +4,32 @@
 
 namespace rhytid::adjoint {
 
+Coordinate coordinate_of(const ParameterSpec& spec) {
+  const double p = spec.value, range = spec.upper - spec.lower;
+  switch (spec.transform) {
+    case ParameterTransform::none:
+      return {ParameterTransform::none, 0.5 * range};
+    case ParameterTransform::log:
+      if (p > 0) return {spec.transform, 0};
+      break;
+    case ParameterTransform::logit:
+      if (p > spec.lower && p < spec.upper) return {spec.transform, 0};
+      break;
+  }
+  return {ParameterTransform::none, p != 0 ? std::fabs(p) : range};
+}
+
 ParameterSpace::ParameterSpace(const SceneModel& scene_model, const std::vector<std::string>& addresses)
     : scene_model_(&scene_model), jacobian_(scene_model.native().size(), addresses.size()) {
   for (std::size_t k = 0; k < addresses.size(); ++k) {
     ParameterSpec spec = describe_parameter(scene_model.scene(), addresses[k]);
     const double p = spec.value;
-    const bool fits = spec.transform == ParameterTransform::log     ? p > 0
-                      : spec.transform == ParameterTransform::logit ? p > spec.lower && p < spec.upper
-                                                                    : true;
-    const double half_range = 0.5 * (spec.upper - spec.lower);
-    scale_.push_back(spec.transform == ParameterTransform::none ? half_range
-                     : p != 0                                   ? std::fabs(p)
-                                                                : 2 * half_range);
-    if (!fits) spec.transform = ParameterTransform::none;
+    coordinates_.push_back(coordinate_of(spec));
+    spec.transform = coordinates_.back().transform;
     const double slope = spec.transform == ParameterTransform::log ? p
                          : spec.transform == ParameterTransform::logit
                              ? (p - spec.lower) * (spec.upper - p) / (spec.upper - spec.lower)
-                             : scale_.back();
+                             : coordinates_.back().scale;
     jacobian_.col(static_cast<Eigen::Index>(k)) =
         slope * scene_model.native_derivative(scene_model.scene(), spec.address);
     specs_.push_back(std::move(spec));
@@ -40,7 +49,7 @@ double ParameterSpace::value(int k, double x) const {
     case ParameterTransform::none:
       break;
   }
-  return s.value + x * scale_[k];
+  return s.value + x * coordinates_[k].scale;
 }
 
 std::vector<double> ParameterSpace::values(const VectorXd& x) const {

@@ -15,15 +15,25 @@
 
 namespace rhytid::adjoint {
 
+/// What a unit of a parameter's coordinate is.
+struct Coordinate {
+  ParameterTransform transform = ParameterTransform::none;  ///< the one in use
+  double scale = 0;  ///< s of a plain coordinate, in the parameter's unit (mm of a place); 0 for the others
+};
+
+/// The coordinate of a parameter as the scene describes it. A value that its transform cannot hold (0 under a
+/// logarithm, outside the bounds of a logit) has a plain one with s = |p₀|, or u − l when p₀ = 0.
+Coordinate coordinate_of(const ParameterSpec& spec);
+
 /// Coordinates of some addresses of a scene. The scene model must outlive it.
 class ParameterSpace {
  public:
-  /// Throws InputError for an address that is not fit-able. A value that its transform cannot hold (0 under a
-  /// logarithm, outside the bounds of a logit) gets a plain coordinate with s = |p₀|, or u − l when p₀ = 0.
+  /// Throws InputError for an address that is not fit-able.
   ParameterSpace(const SceneModel& scene_model, const std::vector<std::string>& addresses);
 
   int size() const { return static_cast<int>(specs_.size()); }
   const std::vector<ParameterSpec>& specs() const { return specs_; }
+  const std::vector<Coordinate>& coordinates() const { return coordinates_; }
   /// p at coordinates x [size], internal units.
   std::vector<double> values(const VectorXd& x) const;
   /// The scene with those values. Throws InputError when a value leaves what a scene may hold.
@@ -37,7 +47,7 @@ class ParameterSpace {
 
   const SceneModel* scene_model_;
   std::vector<ParameterSpec> specs_;  ///< transform: the one in use
-  std::vector<double> scale_;         ///< s of plain coordinates
+  std::vector<Coordinate> coordinates_;
   MatrixXd jacobian_;
 };
 

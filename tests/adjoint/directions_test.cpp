@@ -57,6 +57,7 @@ TEST(Directions, ANullVectorThatIsKnownLeadsTheNullSpace) {
 }
 
 TEST(Directions, InWords) {
+  EXPECT_EQ(named_components(Vec3(-0.4, 1, 0.2)), (std::vector<int>{1, 0}));
   const std::vector<std::string> names = {"a", "b", "c"};
   EXPECT_EQ(direction_in_words(Vec3(0.1, 1, 0), names), "b is not determined: changing it");
   EXPECT_EQ(direction_in_words(Vec3(1, 0.9, 0.8), names), "a, b, c go together: raising all of them");

@@ -249,6 +249,17 @@ TEST(ParameterSpace, CoordinatesFollowTheTransforms) {
   EXPECT_GT(space.values((VectorXd(2) << 0, 40).finished())[1], 0.99);
   EXPECT_LE(space.values((VectorXd(2) << 0, 40).finished())[1], 0.999);
   EXPECT_TRUE(space.native(VectorXd::Zero(2)) == c.scene_model.native());
+  // What a unit of a coordinate is: of a place half of what a fit may move it.
+  const ParameterSpace knot(c.scene_model, {"/ligaments/stiffness", "/colliders/finger/path/0/position/0"});
+  EXPECT_EQ(knot.coordinates()[0].transform, ParameterTransform::log);
+  EXPECT_EQ(knot.coordinates()[1].transform, ParameterTransform::none);
+  const double moved = knot.values(VectorXd::Unit(2, 1))[1] - knot.values(VectorXd::Zero(2))[1];
+  EXPECT_NEAR(knot.coordinates()[1].scale, moved, 1e-12);
+  EXPECT_NEAR(moved, 5, 1e-12);
+  ParameterSpec spec = knot.specs()[0];
+  spec.value = 0;  // has no logarithm
+  EXPECT_EQ(coordinate_of(spec).transform, ParameterTransform::none);
+  EXPECT_EQ(coordinate_of(spec).scale, spec.upper - spec.lower);
 }
 
 }  // namespace
