@@ -30,7 +30,7 @@ struct CommonOptions {
   bool log_json = false;
 };
 
-/// The stem of the file, or the name of its folder for scene.json and case.json.
+/// The stem of the file, or the name of its folder for scene.json, case.json and experiment.json.
 std::string name_of_file(const std::string& file);
 
 /// The default output folder: run/<name_of_file>.

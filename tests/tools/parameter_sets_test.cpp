@@ -7,6 +7,7 @@
 
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
+#include "tests/support/small_scenes.h"
 #include "tools/study/study_run.h"
 
 namespace rhytid::tools {
@@ -83,6 +84,17 @@ TEST(GridSets, MultiplyTheVariantsOfAnExperiment) {
                 with_parameter_sets(e, {{"b.c", {}, "sets.csv:2"}, {"c", {}, "sets.csv:3"}});
               }),
               HasSubstr("sets.csv:3: got two runs called 'a.b.c'"));
+  // That of a table is no folder's, however it is put together.
+  e.variants = {{"results", {}, {}}, {"swipes", {}, {}}};
+  EXPECT_THAT(refusal([&] {
+                with_parameter_sets(e, {{"csv", {}, "sets.csv:2"}});
+              }),
+              HasSubstr("sets.csv:2: got \"results.csv\", which is a file of the sweep"));
+  e.variants.erase(e.variants.begin());
+  EXPECT_THAT(refusal([&] {
+                with_parameter_sets(e, {{"csv", {}, "sets.csv:2"}});
+              }),
+              HasSubstr("got \"swipes.csv\", which is a file of the plan"));
 }
 
 TEST_F(TableFile, HasARowPerRunAndKnowsItsLines) {
@@ -102,6 +114,42 @@ TEST_F(TableFile, IsRefusedWithTheLine) {
   EXPECT_THAT(error_of("name,/a\nx,1\nx,2\n"), HasSubstr(":3: got \"x\" a second time"));
   EXPECT_THAT(error_of("name,/a\nx y,1\n"), HasSubstr("letters, digits"));
   EXPECT_THAT(error_of("/a\n"), HasSubstr("no rows"));
+  EXPECT_THAT(error_of("name\nx\n"), HasSubstr(":1: got no address, expected a column of values"));
+}
+
+// A value has many addresses: items by name and by number, and all that is around it.
+TEST_F(TableFile, ARunHasTheValuesThatItsTableSays) {
+  write_file(path_, test::drag_scene(2, 2));
+  Experiment e = experiment_of_scene(path_);
+  const auto error_of_run = [&](const std::vector<std::string>& axes, const std::vector<std::string>& set) {
+    const Experiment swept = with_parameter_sets(e, grid_sets(axes));
+    return refusal([&] { check_swept_values(swept, swept.variants.back(), set); });
+  };
+  const std::string film = "/skin/layers/film/youngs_modulus=1,2";
+  EXPECT_EQ(error_of_run({film}, {"/skin/layers/0/youngs_modulus=3", "/skin/order=3"}), "");
+  EXPECT_EQ(error_of_run({film, "/skin/layers/soft/youngs_modulus=3"}, {}), "");
+  EXPECT_THAT(error_of_run({film}, {"/skin/layers/1/youngs_modulus=3"}),
+              HasSubstr("--set: got /skin/layers/1/youngs_modulus=3, which the sweep sets in every run as "
+                        "/skin/layers/film/youngs_modulus"));
+  EXPECT_THAT(error_of_run({film}, {"/skin/layers/01/youngs_modulus=3"}), HasSubstr("--set: got"));
+  EXPECT_THAT(error_of_run({film}, {"/skin/layers=[]"}), HasSubstr("--set: got /skin/layers=[]"));
+  EXPECT_THAT(error_of_run({film}, {"/skin/layers/1/name=crust", "/skin/layers/crust/youngs_modulus=3"}),
+              HasSubstr("--set: got /skin/layers/crust/youngs_modulus=3"));
+  EXPECT_THAT(error_of_run({"/skin/surface/grid/cells/0=3,4"}, {"/skin/surface/grid/cells=[4,3]"}),
+              HasSubstr("--set: got /skin/surface/grid/cells=[4,3]"));
+  EXPECT_THAT(error_of_run({"/ligaments/sources/0/strength=1,2", "/ligaments/sources/left/strength=3"}, {}),
+              HasSubstr("--grid: got /ligaments/sources/left/strength, of which "
+                        "/ligaments/sources/0/strength sets a part or the whole"));
+  EXPECT_THAT(error_of_run({film, "/skin={}"}, {}), HasSubstr("--grid: got /skin, of which"));
+  // What the experiment sets before the sweep is meant to be swept over.
+  e.variants = {{"thin", {{"/skin/layers/1/youngs_modulus=9"}}, {}}};
+  EXPECT_EQ(error_of_run({film}, {}), "");
+}
+
+TEST(FileNames, AreDifferentForDifferentTexts) {
+  EXPECT_THAT(
+      file_names({"film youngs_modulus", "film-2.b", "a b", "a_b", "A B", "\u00e9", "\u00e8", "a_b_2"}),
+      ElementsAre("film_youngs_modulus", "film-2.b", "a_b", "a_b_2", "A_B_3", "__", "___2", "a_b_2_2"));
 }
 
 TEST(Shards, TakeEveryRunOnce) {

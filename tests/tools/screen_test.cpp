@@ -37,11 +37,17 @@ TEST(ParameterRange, IsEvenInTheCoordinate) {
   EXPECT_NEAR(logit.at(0), 1 / 17., 1e-14);  // odds 1/16, 1/4, 1
   EXPECT_NEAR(logit.at(0.5), 0.2, 1e-14);
   EXPECT_NEAR(logit.at(1), 0.5, 1e-14);
-  const ParameterRange plain = range_around(spec(-2, -10, 10, ParameterTransform::none), 1.5);
-  EXPECT_NEAR(plain.at(0.25), -2.5, 1e-14);
+  // Places: half of what a fit may move them, wherever the origin is.
+  for (const double origin : {0.0, -2.0, 300.0}) {
+    const ParameterRange plain =
+        range_around(spec(origin, origin - 5, origin + 5, ParameterTransform::none), 2);
+    EXPECT_NEAR(plain.at(0), origin - 2.5, 1e-12);
+    EXPECT_NEAR(plain.at(0.75), origin + 1.25, 1e-12);
+  }
   // Cut at the bounds of a fit.
   EXPECT_EQ(range_around(spec(90, 0.01, 100, ParameterTransform::log), 3).at(1), 100);
-  EXPECT_THROW(range_around(spec(2, 0, 9, ParameterTransform::log), 1), InputError);
+  for (const double factor : {1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+    EXPECT_THROW(range_around(spec(2, 0, 9, ParameterTransform::log), factor), InputError);
 }
 
 TEST(ParameterRange, TablesAreRefusedWithTheLine) {
@@ -129,6 +135,15 @@ TEST(Screen, RanksParametersAndKeepsItsRuns) {
   EXPECT_EQ(again.code, 0);
   EXPECT_THAT(again.err, HasSubstr("runs finished before"));
   EXPECT_EQ(place.text("out/effects.csv"), effects);
+  // Of another method and other outputs, the plots of the first go; what is not the screening's stays.
+  const std::string mine = "mine";
+  write_file(place.at("out/force_mine.svg"), mine);
+  EXPECT_TRUE(place.has("out/rms_displacement.svg"));
+  EXPECT_EQ(place.call("screen", "scene.json", with(kTwoParameters, {"--sobol", "2"})).code, 0);
+  for (const char* file : {"effects.csv", "rms_displacement.svg", "force_finger.svg", "max_displacement.svg"})
+    EXPECT_FALSE(place.has(std::string("out/") + file)) << file;
+  EXPECT_TRUE(place.has("out/rms_displacement_ranking.svg"));
+  EXPECT_EQ(place.text("out/force_mine.svg"), mine);
   // Other settings are other runs.
   const StudyCall other =
       place.call("screen", "scene.json", with(kTwoParameters, {"--set", "/time/frames=1"}));
@@ -143,8 +158,10 @@ TEST(Screen, ShardsTogetherMakeTheWhole) {
   const StudyCall part = place.call("screen", "scene.json", with(kTwoParameters, {"--shard", "1/2"}));
   EXPECT_EQ(part.code, 0) << part.err;
   EXPECT_THAT(part.out, HasSubstr("the figures are preliminary"));
-  EXPECT_THAT(place.text("out/runs.csv"), HasSubstr("missing"));
+  EXPECT_THAT(part.out, HasSubstr("part 1 of 2 is in"));
   EXPECT_EQ(place.call("screen", "scene.json", with(kTwoParameters, {"--shard", "2/2"})).code, 0);
+  EXPECT_FALSE(place.has("out/runs.csv")) << "parts make no tables";
+  EXPECT_EQ(place.call("screen", "scene.json", kTwoParameters).code, 0);
   EXPECT_EQ(place.text("out/runs.csv"), whole.text("out/runs.csv"));
   EXPECT_EQ(place.text("out/effects.csv"), whole.text("out/effects.csv"));
 }
@@ -183,6 +200,7 @@ TEST(Screen, RefusesInOneLine) {
   };
   EXPECT_THAT(error_of({"--parameter", "/ligaments/stifness"}), HasSubstr("/ligaments/stiffness"));
   EXPECT_THAT(error_of({"--factor", "1"}), HasSubstr("--factor: got 1, expected a number above 1"));
+  EXPECT_THAT(error_of({"--set", "/time/frames=0"}), HasSubstr("/time/frames: got 0, expected at least one"));
   EXPECT_THAT(error_of({"--shard", "3/2"}), HasSubstr("--shard: got '3/2'"));
   EXPECT_THAT(error_of({"--levels", "3"}), HasSubstr("--levels"));
   EXPECT_THAT(error_of({"--variant", "x"}), HasSubstr("--variant"));

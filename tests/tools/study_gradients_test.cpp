@@ -9,6 +9,7 @@
 #include "sim/scene/scene_model.h"
 #include "tests/tools/study_call.h"
 #include "tools/study/sensitivity.h"
+#include "tools/study/study_page.h"
 
 namespace rhytid::tools {
 namespace {
@@ -31,6 +32,7 @@ TEST(SensitivityJudgement, OfAKnownResponse) {
   Sensitivity s;
   s.parameters = {named("/skin/layers/a/youngs_modulus", "a", 2),
                   named("/skin/layers/b/youngs_modulus", "b", 1), named("/c", "c", 1)};
+  s.coordinates.assign(3, {ParameterTransform::log, 0});
   // Positions feel ln a − ln b with 3 mm and ln c with 0.02 mm; a and b together are the gauge.
   s.response.root = MatrixXd::Zero(3, 3);
   s.response.root(0, 0) = 3, s.response.root(0, 1) = -3, s.response.root(2, 2) = 0.02;
@@ -55,6 +57,64 @@ TEST(SensitivityJudgement, OfAKnownResponse) {
   judge(s, options, std::nullopt);
   EXPECT_EQ(s.held, -1);
   EXPECT_THAT(s.sentences[0], HasSubstr("a, b go together: raising all of them moves nothing."));
+  // A tenth of a place is a length, of a fraction a tenth of its odds.
+  s.parameters[2].unit = "mm";
+  s.coordinates[2] = {ParameterTransform::none, 5};
+  judge(s, options, std::nullopt);
+  EXPECT_THAT(s.sentences[1], HasSubstr("c is not determined: changing it by 0.5 mm changes all tracks"));
+  s.response.root << 3, 0, 0, 0, 0.02, -0.02, 0, 0, 0.001;
+  s.coordinates[1] = {ParameterTransform::logit, 0};
+  judge(s, options, std::nullopt);
+  ASSERT_FALSE(s.sentences.empty());
+  EXPECT_THAT(s.sentences[0], HasSubstr("raising all of them by 10 % ("));
+  EXPECT_THAT(s.sentences[0], HasSubstr("c by 0.5 mm"));
+  EXPECT_THAT(s.sentences[0], HasSubstr("b by 10 % of its odds"));
+}
+
+TEST(Deviations, AreReadInTheUnitOfTheirCoordinate) {
+  const adjoint::Coordinate log{ParameterTransform::log, 0}, logit{ParameterTransform::logit, 0},
+      knot{ParameterTransform::none, 5};
+  EXPECT_EQ(deviation_text(0.03, log, "MPa"), "3 %");
+  EXPECT_EQ(deviation_text(1, log, "MPa"), "factor 2.7");
+  EXPECT_EQ(deviation_text(9, log, "MPa"), "factor > 20");
+  EXPECT_EQ(deviation_text(0.03, logit, ""), "odds 3 %");
+  EXPECT_EQ(deviation_text(1, logit, ""), "odds factor 2.7");
+  EXPECT_EQ(deviation_text(0.03, knot, "mm"), "0.15 mm");
+  EXPECT_EQ(deviation_text(1, knot, "mm"), "5 mm");
+  EXPECT_EQ(deviation_text(INFINITY, knot, "mm"), "open");
+  EXPECT_EQ(coordinate_text(knot, "mm"), "5 mm");
+}
+
+// Sources whose names make the same file name, seen along a direction and not.
+TEST(Sensitivity, ResponsesHaveFilesOfTheirOwnAndDoNotDependOnTheView) {
+  const StudyPlace place("sensitivity_names");
+  const std::vector<std::string> arguments = {
+      "--set",       "/ligaments/sources/0/name=a b",      "--set",       "/ligaments/sources/1/name=a_b",
+      "--parameter", "/ligaments/sources/0/strength",      "--parameter", "/ligaments/sources/1/strength",
+      "--parameter", "/colliders/finger/path/1/position/0"};
+  const StudyCall call = place.call("sensitivity", "scene.json", arguments);
+  ASSERT_EQ(call.code, 0) << call.err;
+  EXPECT_TRUE(place.has("out/response_a_b_strength.png"));
+  EXPECT_TRUE(place.has("out/response_a_b_strength_2.png"));
+  const std::string map = place.text("out/map.vtp");
+  EXPECT_THAT(map, HasSubstr("\"response_a_b_strength_mm\""));
+  EXPECT_THAT(map, HasSubstr("\"response_a_b_strength_2_mm\""));
+  // The deviation of a place is a length.
+  EXPECT_THAT(call.out, testing::ContainsRegex("finger path 1 position x .* 5 mm .* [0-9.e-]+ mm"));
+  const auto whole = nlohmann::json::parse(place.text("out/sensitivity.json"));
+  EXPECT_TRUE(whole["view"].is_null());
+  EXPECT_EQ(whole["parameters"][2]["coordinate_unit"], "5 mm");
+  auto along = arguments;
+  along.insert(along.end(), {"--view", "0", "0", "-3"});
+  const StudyCall seen_call = place.call("sensitivity", "scene.json", along);
+  EXPECT_THAT(seen_call.out, HasSubstr("seen along (0, 0, -1)"));
+  const auto seen = nlohmann::json::parse(place.text("out/sensitivity.json"));
+  EXPECT_EQ(seen["view"], nlohmann::json({0.0, 0.0, -1.0}));
+  for (int k = 0; k < 3; ++k) {
+    for (const char* figure : {"rms_mm", "max_mm"})
+      EXPECT_EQ(seen["parameters"][k][figure], whole["parameters"][k][figure]) << k;
+    EXPECT_GT(seen["parameters"][k]["deviation"], whole["parameters"][k]["deviation"]) << k;
+  }
 }
 
 TEST(Sensitivity, OfASceneThroughTheVerb) {
@@ -116,7 +176,11 @@ TEST(Sensitivity, RefusesInOneLine) {
   EXPECT_THAT(error_of({"--parameter", "/base/stiffness", "--hold", "/ligaments/stiffness"}),
               HasSubstr("--hold"));
   EXPECT_THAT(error_of({"--noise", "0"}), HasSubstr("--noise"));
-  EXPECT_THAT(error_of({"--view", "0", "0", "0"}), HasSubstr("--view"));
+  for (const char* noise : {"nan", "inf", "-1", "1e-300"})
+    EXPECT_THAT(error_of({"--noise", noise}), HasSubstr("--noise: got '" + std::string(noise) + "'"));
+  EXPECT_THAT(error_of({"--view", "0", "0", "0"}), HasSubstr("--view: got 0 0 0, expected a direction"));
+  EXPECT_THAT(error_of({"--view", "1", "nan", "0"}), HasSubstr("--view: got 1 nan 0, expected a direction"));
+  EXPECT_THAT(error_of({"--view", "inf", "2", "0"}), HasSubstr("--view: got inf 2 0"));
   EXPECT_THAT(error_of({"--set", "/time/frames=0"}), HasSubstr("frames"));
 }
 
@@ -153,6 +217,12 @@ TEST(PlanStudy, RanksSwipesAndKeepsThem) {
   EXPECT_THAT(place.text("out/pairs.csv"), HasSubstr("D,along,across,"));
   // Less noise, the same runs: deviations fall in every swipe.
   auto sharper = kUnknowns;
+  // What text and page say of a parameter they say from one table.
+  for (const char* said : {"information [bits]", "factor "}) {
+    EXPECT_THAT(call.out, HasSubstr(said));
+    EXPECT_THAT(place.text("out/index.html"), HasSubstr(said));
+  }
+  EXPECT_THAT(call.out, HasSubstr(place.text("out/plan.txt")));
   sharper.insert(sharper.end(), {"--noise", "0.001", "--prior-of", "/ligaments/sources/left/strength=0.5"});
   const std::string before = place.text("out/swipes.csv");
   const StudyCall again = place.call("plan", "swipes.json", sharper);
@@ -172,6 +242,17 @@ TEST(PlanStudy, RanksSwipesAndKeepsThem) {
   EXPECT_EQ(place.text("out/swipes.csv") + place.text("out/pairs.csv") + place.text("out/order.csv"), once);
 }
 
+TEST(PlanStudy, OfPlacesHasLengths) {
+  const StudyPlace place("plan_places");
+  write_file(place.at("swipes.json"), swipes());
+  const StudyCall call = place.call("plan", "swipes.json",
+                                    {"--parameter", "/ligaments/sources/left/position/0", "--parameter",
+                                     "/skin/layers/soft/poissons_ratio"});
+  ASSERT_EQ(call.code, 0) << call.err;
+  EXPECT_THAT(call.out, testing::ContainsRegex("left position x +10 mm +[0-9.e-]+ mm"));
+  EXPECT_THAT(call.out, testing::ContainsRegex("soft poissons_ratio +odds factor 2.7"));
+}
+
 TEST(PlanStudy, RefusesInOneLine) {
   const StudyPlace place("plan_refused");
   const auto error_of = [&](const std::string& experiment, const std::vector<std::string>& more) {
@@ -185,7 +266,16 @@ TEST(PlanStudy, RefusesInOneLine) {
   EXPECT_THAT(error_of(swipes(), {"--filmed", "alng"}),
               HasSubstr("--filmed: got 'alng', expected one of along, across"));
   EXPECT_THAT(error_of(swipes(), {"--prior-of", "/base/stiffness"}), HasSubstr("--prior-of"));
-  EXPECT_THAT(error_of(swipes(), {"--prior", "-1"}), HasSubstr("--prior"));
+  for (const char* prior : {"-1", "nan", "inf"}) {
+    EXPECT_THAT(error_of(swipes(), {"--prior", prior}), HasSubstr("--prior: got '" + std::string(prior)));
+    EXPECT_THAT(error_of(swipes(), {"--prior-of", "/base/stiffness=" + std::string(prior)}),
+                HasSubstr("--prior-of: got '/base/stiffness=" + std::string(prior)));
+  }
+  EXPECT_THAT(error_of(swipes(), {"--prior-of", "/ligaments/sources/0/strength=1", "--prior-of",
+                                  "/ligaments/sources/left/strength=2"}),
+              HasSubstr("--prior-of: got '/ligaments/sources/left/strength=2', that address a second time"));
+  EXPECT_THAT(error_of(swipes(R"(, {"name": "still", "settings": ["/time/frames=0"]})"), {}),
+              HasSubstr("variant still: /time/frames: got 0, expected at least one frame"));
   EXPECT_THAT(error_of(swipes(R"(, {"name": "firm", "settings": ["/base/stiffness=0.3"]})"),
                        {"--parameter", "/base/stiffness"}),
               HasSubstr("variant firm: /base/stiffness: got 0.3, expected 0.1, as in the other swipes"));

@@ -25,7 +25,10 @@ TEST(SweptGrid, OfASceneRunsInShardsAndKeepsWhatIsFinished) {
   part.insert(part.end(), {"--shard", "2/2"});
   const StudyCall second = place.call("sweep", "scene.json", part);
   ASSERT_EQ(second.code, 0) << second.err;
-  EXPECT_THAT(second.out, HasSubstr("Left out: 0001 (not finished)."));
+  EXPECT_THAT(second.out, HasSubstr("part 2 of 2 is in " + place.at("out")));
+  EXPECT_TRUE(place.has("out/0002/variant.json"));
+  for (const char* table : {"results.csv", "results.md", "index.html"})  // another machine may be writing
+    EXPECT_FALSE(place.has(std::string("out/") + table)) << table;
   const StudyCall all = place.call("sweep", "scene.json", grid);
   ASSERT_EQ(all.code, 0) << all.err;
   EXPECT_THAT(all.err, HasSubstr("0002: complete before, kept"));
@@ -60,6 +63,45 @@ TEST(SweptGrid, RefusesInOneLine) {
   EXPECT_THAT(error_of({"--grid", "/skin/surface/grid/cells=1"}),
               HasSubstr("--set: got /skin/surface/grid/cells"));
   EXPECT_THAT(error_of({"--grid", "/skin/order=2,9"}), HasSubstr("0002"));
+  EXPECT_THAT(error_of({"--grid", "/skin/layers/0/youngs_modulus=0.02,0.04", "--set",
+                        "/skin/layers/soft/youngs_modulus=0.03"}),
+              HasSubstr("--set: got /skin/layers/soft/youngs_modulus=0.03, which the sweep sets"));
+}
+
+TEST(SweptGrid, AndPlanDoNotShareAFolder) {
+  const StudyPlace place("swept_planned");
+  const std::string file = place.at("press/experiment.json");
+  std::filesystem::create_directories(place.at("press"));
+  write_file(file, R"({"scene": "../scene.json", "settings": ["/skin/surface/grid/cells=[4,3]",
+    "/output/pictures=false", "/output/vtu=false"], "variants": [{"name": "a"}, {"name": "b"}]})");
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(place.at(""));
+  const std::vector<std::string> unknown = {"--parameter", "/ligaments/stiffness"};
+  const auto call = [&](std::vector<std::string> arguments, bool has_unknown = true) {
+    if (has_unknown) arguments.insert(arguments.end(), unknown.begin(), unknown.end());
+    return call_study(arguments);
+  };
+  // Folders by default: of the folder of experiment.json, of variants, of studies.
+  EXPECT_EQ(call({"sweep", file, "--only", "a"}, false).code, 0);
+  const std::string results = place.text("run/press_quick/results.csv");
+  EXPECT_EQ(call({"plan", file}).code, 0);
+  EXPECT_TRUE(place.has("run/press_quick_plan/swipes.csv"));
+  EXPECT_EQ(place.text("run/press_quick/results.csv"), results);
+  EXPECT_EQ(call({"sensitivity", file, "--variant", "b", "--size", "full"}).code, 0);
+  EXPECT_TRUE(place.has("run/press_b_full_sensitivity/sensitivity.json"));
+  EXPECT_EQ(call({"sensitivity", file}).code, 0);
+  EXPECT_TRUE(place.has("run/press_sensitivity/sensitivity.json"));
+  // Led into each other's they are refused, and change nothing.
+  const StudyCall plan = call({"plan", file, "-o", "run/press_quick"});
+  EXPECT_EQ(plan.code, 2);
+  EXPECT_THAT(plan.err, HasSubstr("run/press_quick/a: got a run of a sweep"));
+  EXPECT_FALSE(place.has("run/press_quick/swipes.csv"));
+  const std::string swipe = place.text("run/press_quick_plan/a/variant.json");
+  const StudyCall sweep = call({"sweep", file, "-o", "run/press_quick_plan"}, false);
+  EXPECT_EQ(sweep.code, 2);
+  EXPECT_THAT(sweep.err, HasSubstr("run/press_quick_plan/a: got a swipe of `study plan`"));
+  EXPECT_EQ(place.text("run/press_quick_plan/a/variant.json"), swipe);
+  std::filesystem::current_path(before);
 }
 
 }  // namespace

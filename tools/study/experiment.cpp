@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <filesystem>
 #include <set>
 
 #include "sim/core/error.h"
@@ -10,6 +9,7 @@
 #include "sim/scene/located_json.h"
 #include "sim/scene/schema.h"
 #include "sim/scene/validate.h"
+#include "tools/study/plan.h"
 #include "tools/study/sweep_report.h"
 #include "tools/verb.h"
 
@@ -210,9 +210,9 @@ void check_variant_name(const std::string& name, const std::string& where) {
           std::string::npos ||
       name.empty() || name.front() == '.')
     throw InputError(where, shown_json(name), "letters, digits, _ - + and dots");
-  const auto& files = sweep_files();
-  if (std::find(files.begin(), files.end(), name) != files.end())
-    throw InputError(where, shown_json(name) + ", which is a file of the sweep", "another name");
+  for (const auto& [files, study] : {std::pair{&sweep_files(), "sweep"}, {&plan_files(), "plan"}})
+    if (std::find(files->begin(), files->end(), name) != files->end())
+      throw InputError(where, shown_json(name) + ", which is a file of the " + study, "another name");
 }
 
 bool is_experiment(const std::string& path) {
@@ -235,7 +235,7 @@ Experiment load_experiment(const std::string& path, StudySize size) {
   Experiment e;
   e.file = path;
   e.name = root["name"], e.description = root["description"], e.scene = root["scene"];
-  if (e.name.empty()) e.name = std::filesystem::path(path).stem().string();
+  if (e.name.empty()) e.name = name_of_file(path);
   e.measure = read_measure(root["measure"]);
   e.measure_json = root["measure"];
   const std::string of_size = std::string("/") + name(size);

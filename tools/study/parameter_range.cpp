@@ -48,7 +48,8 @@ double ParameterRange::at(double x) const {
 }
 
 ParameterRange range_around(const ParameterSpec& spec, double factor) {
-  if (!(factor > 1)) throw InputError("--factor", short_text(factor), "a number above 1");
+  if (!(factor > 1) || !std::isfinite(factor))
+    throw InputError("--factor", short_text(factor), "a number above 1");
   const double p = spec.value;
   ParameterRange r{spec, p, p};
   const bool is_inside = p > spec.lower && p < spec.upper;
@@ -59,8 +60,8 @@ ParameterRange range_around(const ParameterSpec& spec, double factor) {
     r.lower = spec.lower + width * (odds / factor) / (1 + odds / factor);
     r.upper = spec.lower + width * (odds * factor) / (1 + odds * factor);
   } else {
-    const double size = p != 0 ? std::fabs(p) : spec.upper - spec.lower;
-    r.lower = p - (factor - 1) * size, r.upper = p + (factor - 1) * size;
+    const double reach = (1 - 1 / factor) * 0.5 * (spec.upper - spec.lower);
+    r.lower = p - reach, r.upper = p + reach;
   }
   r.lower = std::max(r.lower, std::min(spec.lower, p));
   r.upper = std::min(r.upper, std::max(spec.upper, p));

@@ -17,9 +17,9 @@ struct ParameterRange {
   double at(double x) const;
 };
 
-/// p/factor to p·factor for log parameters, the same of the odds for logit ones, and p ± (factor − 1)·|p| for
-/// plain ones, cut to the bounds of a fit; a value beyond these is not cut away. Throws InputError unless
-/// factor > 1, or for a range without extent.
+/// p/factor to p·factor for log parameters, the same of the odds for logit ones, and p ± (1 − 1/factor)·(u − l)/2
+/// for plain ones (places: wherever the origin is), cut to the bounds l, u of a fit; a value beyond these is not
+/// cut away. Throws InputError unless factor > 1 and finite, or for a range without extent.
 ParameterRange range_around(const ParameterSpec& spec, double factor);
 
 /// A table "address, lower, upper", values with or without units. Throws InputError naming file and line: an

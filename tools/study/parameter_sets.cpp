@@ -1,6 +1,7 @@
 #include "tools/study/parameter_sets.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <set>
 #include <sstream>
@@ -20,6 +21,34 @@ std::string numbered(std::size_t i) {
   char text[24];
   std::snprintf(text, sizeof text, "%04zu", i + 1);
   return text;
+}
+
+/// The keys of a pointer, items of lists by number. Those that the scene has not stay as they are.
+std::vector<std::string> resolved_keys(const nlohmann::json& scene, const std::string& pointer) {
+  std::vector<std::string> keys = split_pointer(pointer, pointer);
+  const nlohmann::json* node = &scene;
+  for (std::string& key : keys) {
+    if (node == nullptr) break;
+    if (node->is_array()) {
+      int index = -1;
+      const char* const end = key.data() + key.size();
+      if (const auto read = std::from_chars(key.data(), end, index);
+          read.ec != std::errc() || read.ptr != end)
+        index = find_named(*node, key);
+      if (index >= 0) key = std::to_string(index);
+      node = index >= 0 && index < static_cast<int>(node->size()) ? &(*node)[static_cast<std::size_t>(index)]
+                                                                  : nullptr;
+    } else {
+      node = node->is_object() && node->contains(key) ? &(*node)[key] : nullptr;
+    }
+  }
+  return keys;
+}
+
+/// Whether the keys are the same as far as the shorter goes.
+bool overlap(const std::vector<std::string>& a, const std::vector<std::string>& b) {
+  return std::equal(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(std::min(a.size(), b.size())),
+                    b.begin());
 }
 
 }  // namespace
@@ -70,6 +99,8 @@ std::vector<ParameterSet> table_sets(const std::string& path) {
             header.begin() + static_cast<std::ptrdiff_t>(k))
           throw InputError(line.place, header[k] + " a second time", "each column once");
       }
+      if (header == std::vector<std::string>{"name"})
+        throw InputError(line.place, "no address", "a column of values at least, as /skin/order");
       return;
     }
     require_cells_as_in_header(line, header.size());
@@ -116,9 +147,37 @@ Experiment with_parameter_sets(const Experiment& experiment, const std::vector<P
       if (!names.insert(run.name).second)
         throw InputError(set.origin, "two runs called '" + run.name + "'",
                          "names that differ when joined by a dot");
+      check_variant_name(run.name, set.origin);
       swept.variants.push_back(std::move(run));
     }
   return swept;
+}
+
+void check_swept_values(const Experiment& experiment, const Variant& run,
+                        const std::vector<std::string>& command_line) {
+  std::vector<Setting> settings = run.settings;
+  for (const std::string& text : command_line) settings.push_back({text});
+  const std::size_t first = run.settings.size() - run.values.size();  // those of the sweep come last
+  LocatedJson scene = read_with_extends(experiment.scene);
+  std::vector<std::vector<std::string>> swept;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const std::string address = settings[i].text.substr(0, settings[i].text.find('='));
+    if (i >= first) {
+      // Before it is applied: it may itself change names.
+      const std::vector<std::string> keys = resolved_keys(scene.json, address);
+      for (std::size_t k = 0; k < swept.size(); ++k) {
+        if (!overlap(keys, swept[k])) continue;
+        const std::string& other = run.values[k].address;
+        if (i < run.settings.size())
+          throw InputError(settings[i].origin, address + ", of which " + other + " sets a part or the whole",
+                           "addresses of different values");
+        throw InputError("--set", settings[i].text + ", which the sweep sets in every run as " + other,
+                         "another address");
+      }
+      if (i < run.settings.size()) swept.push_back(keys);
+    }
+    apply_override(scene, settings[i], experiment.scene);
+  }
 }
 
 }  // namespace rhytid::tools

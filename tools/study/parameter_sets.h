@@ -29,7 +29,14 @@ std::vector<ParameterSet> table_sets(const std::string& path);
 /// file cannot be read.
 Experiment experiment_of_scene(const std::string& path);
 
-/// Every variant of the experiment with every set, named VARIANT.SET (SET alone for experiment_of_scene).
+/// Every variant of the experiment with every set, named VARIANT.SET (SET alone for experiment_of_scene). Throws
+/// InputError for two runs of one name, or one that no folder beside the tables can have.
 Experiment with_parameter_sets(const Experiment& experiment, const std::vector<ParameterSet>& sets);
+
+/// Throws InputError when a run would not have the values that the tables say it has: two addresses of the
+/// sweep, or one and a setting of the command line, are the same value, or one holds the other. Items of lists
+/// by name and by number are the same.
+void check_swept_values(const Experiment& experiment, const Variant& run,
+                        const std::vector<std::string>& command_line);
 
 }  // namespace rhytid::tools

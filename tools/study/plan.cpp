@@ -1,10 +1,8 @@
 #include "tools/study/plan.h"
 
 #include <algorithm>
-#include <cmath>
 #include <ostream>
 
-#include "adjoint/parameter_space.h"
 #include "adjoint/surface_response.h"
 #include "sim/core/error.h"
 #include "sim/core/parse_number.h"
@@ -46,6 +44,12 @@ class Planning {
     choose_swipes();
     choose_parameters();
     choose_priors();
+    for (const Variant* v : wanted_) {
+      require_frames(scene_of(*v), experiment_.file + ": variant " + v->name);
+      if (is_of_run(folder_ + "/" + v->name))
+        throw InputError(folder_ + "/" + v->name, "a run of a sweep or of `simulate`",
+                         "a folder of its own for the plan, by -o");
+    }
     context_.output_folder();
     ExitCode worst = ExitCode::ok;
     for (const Variant* v : wanted_) {
@@ -60,8 +64,7 @@ class Planning {
       const bool is_twice = std::find(plan_.filmed.begin(), plan_.filmed.end(), swipe) != plan_.filmed.end();
       if (at != plan_.swipes.end() && !is_twice) plan_.filmed.push_back(swipe);
     }
-    write_plan(folder_, experiment_, plan_, options_);
-    context_.out << plan_text(plan_, options_) << "written to " << folder_
+    context_.out << write_plan(folder_, experiment_, plan_, options_) << "written to " << folder_
                  << ": index.html, swipes.csv, pairs.csv, order.csv\n";
     return worst;
   }
@@ -112,22 +115,30 @@ class Planning {
       context_.progress.note(address + " is not the same in all swipes: taken as known");
     if (plan_.parameters.empty())
       throw InputError(experiment_.file, "no parameter with the same value in all swipes", "at least one");
-    for (const ParameterSpec& spec : plan_.parameters) addresses_.push_back(spec.address);
+    for (const ParameterSpec& spec : plan_.parameters) {
+      addresses_.push_back(spec.address);
+      plan_.coordinates.push_back(adjoint::coordinate_of(spec));
+    }
   }
 
   void choose_priors() {
     plan_.priors = VectorXd::Constant(static_cast<Eigen::Index>(addresses_.size()), options_.prior);
+    std::vector<std::string> known;
     for (const std::string& text : options_.priors) {
       const std::size_t equals = text.find('=');
       double deviation = 0;
       if (equals == std::string::npos || !parse(std::string_view(text).substr(equals + 1), deviation) ||
-          !std::isfinite(deviation) || !(deviation > 0))
-        throw InputError("--prior-of", "'" + text + "'", "ADDRESS=standard deviation of its log, above 0");
+          !is_size(deviation))
+        throw InputError("--prior-of", "'" + text + "'",
+                         "ADDRESS=standard deviation of its coordinate, a number from 1e-9 to 1e9");
       const std::string address =
           describe_parameter(scene_of(*wanted_.front()), text.substr(0, equals)).address;
       const auto at = std::find(addresses_.begin(), addresses_.end(), address);
       if (at == addresses_.end())
         throw InputError("--prior-of", "'" + address + "'", "one of the parameters planned for");
+      if (is_in(known, address))
+        throw InputError("--prior-of", "'" + text + "', that address a second time", "each address once");
+      known.push_back(address);
       plan_.priors[at - addresses_.begin()] = deviation;
     }
   }

@@ -17,8 +17,12 @@ class PlanCommand final : public StudyCommand {
         "Takes the variants of an experiment for swipes of one face, runs each once and differentiates it. "
         "From a stated noise and a prior follows the posterior of every swipe before there is footage: "
         "deviations per parameter, D- and A-optimality, the best pairs and the order in which to film "
-        "(greedily, beside what is --filmed). Coordinates are logs (logits of fractions): a prior of 1 is a "
-        "factor e. To first order at the scene's values; skin that the finger hides counts as seen. Swipes "
+        "(greedily, beside what is --filmed). Coordinates are logs, logits of fractions, and of places half "
+        "of "
+        "what a fit may move them: a prior of 1 is a factor e, of the odds for fractions, 5 mm for knots of "
+        "a "
+        "path and 10 mm for sources. To first order at the scene's values; skin that the finger hides counts "
+        "as seen. Swipes "
         "that were run are kept; noise, tracks and priors may change without running them again.",
         "experiment.json and its scene; parameters have the same values in all its variants",
         "plan.txt, swipes.csv, pairs.csv, order.csv, posterior.svg, index.html, a folder per swipe. Prints "
@@ -42,8 +46,10 @@ class PlanCommand final : public StudyCommand {
         ->allow_extra_args(false)
         ->option_text("ADDRESS");
     add_track_options(app, options_.tracks);
-    app.add_option("--prior", options_.prior, "standard deviation of every coordinate before (default 1)")
-        ->check(CLI::PositiveNumber)
+    app.add_option(
+           "--prior", options_.prior,
+           "standard deviation of every coordinate before (default 1: a factor e, for places a length)")
+        ->check(size_check())
         ->option_text("SD");
     app.add_option("--prior-of", options_.priors, "that of one parameter; repeatable")
         ->allow_extra_args(false)

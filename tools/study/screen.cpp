@@ -75,6 +75,7 @@ class Screen {
         identity_(study_identity(scene_model_.scene(), scene_model_.model(), loaded_.measure_text)) {}
 
   ExitCode run() {
+    require_frames(scene_model_.scene(), context_.options.file);
     choose_ranges();
     const auto inputs = static_cast<int>(result_.ranges.size());
     if (options_.sobol_samples > 0) {
@@ -88,6 +89,12 @@ class Screen {
     folder_ = context_.output_folder();
     const ExitCode code = run_missing();
     judge();
+    if (options_.shard.count > 1) {  // other machines may be writing into the same folder
+      context_.out << screen_text(result_) << "part " << options_.shard.index << " of "
+                   << options_.shard.count << " is in " << folder_
+                   << "; the same command without --shard makes the tables\n";
+      return code;
+    }
     write_screen(folder_, scene_model_.scene().name, result_);
     context_.out << screen_text(result_) << "written to " << folder_ << ": index.html, runs.csv and more\n";
     return code;

@@ -39,7 +39,7 @@ struct ScreenResult {
   std::vector<std::vector<SobolIndex>> sobol;     ///< likewise
 };
 
-/// Runs what is missing of the shard and writes what is known. Throws InputError.
+/// Runs what is missing of the shard and writes what is known; a shard writes no tables. Throws InputError.
 ExitCode run_screen(VerbContext& context, const ScreenOptions& options);
 
 /// Table for the terminal.

@@ -18,8 +18,8 @@ class ScreenCommand final : public StudyCommand {
         "and with an experiment the amplitude of its wrinkles. By default Morris's elementary effects, "
         "trajectories x (parameters + 1) runs; with --sobol N first-order and total Sobol indices, N x "
         "(parameters + 2) runs. Every run is kept: the same command goes on after a stop, and --shard I/N "
-        "does "
-        "part of it. Seeded: the same command makes the same runs.",
+        "does part of it into the same folder, and a last call without it makes the tables. Seeded: the same "
+        "command makes the same runs.",
         "a scene, a case for its scene, or experiment.json for one of its variants; ranges (address, lower, "
         "upper)",
         "runs.csv, effects.csv (or indices.csv), OUTPUT.svg (mu* against sigma), OUTPUT_ranking.svg, "
@@ -41,7 +41,9 @@ class ScreenCommand final : public StudyCommand {
         ->option_text("TABLE");
     app.add_option(
            "--factor", options_.factor,
-           "ranges are the scene's values divided and multiplied by this (default 2; odds of fractions)")
+           "ranges are the scene's values divided and multiplied by this (default 2; odds of fractions; "
+           "places move by 1 - 1/F of what a fit may move them, 2.5 mm for knots of a path, 5 mm for "
+           "sources)")
         ->option_text("F");
     app.add_option("--trajectories", options_.trajectories, "of Morris (default 10)")
         ->check(CLI::Range(1, 100000))
@@ -58,6 +60,8 @@ class ScreenCommand final : public StudyCommand {
     app.add_option("--shard", shard_, "run part I of N only")->option_text("I/N");
     app.add_flag("--anew", options_.anew, "run again what is finished");
   }
+
+  std::string variant() const override { return options_.variant; }
 
   ExitCode study(VerbContext& context) override {
     options_.size = size();

@@ -1,8 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <numeric>
+#include <set>
 
+#include "sim/core/csv_reader.h"
 #include "sim/output/atomic_file.h"
 #include "sim/output/colour_map.h"
 #include "sim/output/csv.h"
@@ -189,6 +192,21 @@ HtmlTable overview(const ScreenResult& r) {
   return table;
 }
 
+/// Removes the tables of an earlier screening and the plots of the outputs that they list.
+void remove_earlier(const std::string& folder) {
+  std::error_code ignored;
+  for (const char* table : {"/effects.csv", "/indices.csv"}) {
+    std::ifstream lines(folder + table);
+    std::set<std::string> outputs;
+    for_csv_lines(lines, table, [&](const CsvLine& line) { outputs.insert(line.cells.front()); });
+    for (const std::string& output : outputs) {
+      if (output.find('/') != std::string::npos) continue;  // no name of ours
+      for (const char* ending : {".svg", "_ranking.svg"}) fs::remove(folder + "/" + output + ending, ignored);
+    }
+    fs::remove(folder + table, ignored);
+  }
+}
+
 }  // namespace
 
 std::string screen_text(const ScreenResult& r) {
@@ -215,18 +233,7 @@ std::string screen_text(const ScreenResult& r) {
 }
 
 void write_screen(const std::string& folder, const std::string& title, const ScreenResult& r) {
-  std::error_code ignored;
-  // Plots of outputs that an earlier screening had and this one has not; nothing in a folder that is not its own.
-  if (fs::exists(folder + "/screen.txt")) {
-    for (const char* old : {"effects.csv", "indices.csv"}) fs::remove(folder + "/" + old, ignored);
-    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-      const std::string stem = entry.path().stem().string();
-      const bool is_output = stem.starts_with("force_") || stem.starts_with("mean_displacement") ||
-                             stem.starts_with("max_displacement") ||
-                             stem.find("amplitude") != std::string::npos;
-      if (is_output && entry.path().extension() == ".svg") fs::remove(entry.path(), ignored);
-    }
-  }
+  if (fs::exists(folder + "/screen.txt")) remove_earlier(folder);  // nothing in a folder that is not its own
   write_runs(folder, r);
   write_effects(folder, r);
   write_file(folder + "/screen.txt", screen_text(r));

@@ -6,11 +6,11 @@
 #include <ostream>
 
 #include "adjoint/ligament_gradient.h"
-#include "adjoint/parameter_space.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
 #include "tools/polished_run.h"
 #include "tools/study/sensitivity_report.h"
+#include "tools/study/study_page.h"
 #include "tools/study/study_run.h"
 
 namespace rhytid::tools {
@@ -59,8 +59,9 @@ int held_parameter(const Sensitivity& s, const SensitivityOptions& options) {
 }
 
 /// Keeps the columns of `response` that move something and names the others.
-void drop_without_effect(Sensitivity& s, const std::vector<ParameterSpec>& specs,
-                         const adjoint::TangentResult& tangent, std::vector<int>& kept) {
+void drop_without_effect(Sensitivity& s, const ParameterSpace& space, const adjoint::TangentResult& tangent,
+                         std::vector<int>& kept) {
+  const std::vector<ParameterSpec>& specs = space.specs();
   VectorXd largest = VectorXd::Zero(static_cast<Eigen::Index>(specs.size()));
   for (const MatrixXd& frame : tangent.frames)
     if (frame.rows() > 0) largest = largest.cwiseMax(frame.cwiseAbs().colwise().maxCoeff().transpose());
@@ -68,10 +69,28 @@ void drop_without_effect(Sensitivity& s, const std::vector<ParameterSpec>& specs
     if (largest[k] > kNoEffect * largest.maxCoeff()) {
       kept.push_back(k);
       s.parameters.push_back(specs[k]);
+      s.coordinates.push_back(space.coordinates()[k]);
     } else {
       s.without_effect.push_back(specs[k].address);
     }
   }
+}
+
+/// A tenth of the coordinates along a direction, with what that is of places and of fractions: "by 10 %", "by
+/// 0.5 mm", "by 10 % (knot by 0.5 mm)".
+std::string by_a_tenth(const Sensitivity& s, const VectorXd& direction) {
+  const std::vector<int> named = adjoint::named_components(direction);
+  std::string others;
+  for (const int k : named) {
+    const adjoint::Coordinate& c = s.coordinates[k];
+    if (c.transform == ParameterTransform::log) continue;
+    const std::string by =
+        " by " + (c.transform == ParameterTransform::none ? deviation_text(0.1, c, s.parameters[k].unit)
+                                                          : std::string("10 % of its odds"));
+    if (named.size() == 1) return by;
+    others += (others.empty() ? "" : ", ") + s.parameters[k].name + by;
+  }
+  return " by 10 %" + (others.empty() ? "" : " (" + others + ")");
 }
 
 void add_map(Sensitivity& s, const SceneModel& scene_model, const Trajectory& run,
@@ -137,7 +156,7 @@ void judge(Sensitivity& s, const SensitivityOptions& options, const std::optiona
               : adjoint::direction_in_words(v, names) + " moves nothing.");
     } else if (s.directions.singular_values[i] < 1) {
       s.sentences.push_back(
-          adjoint::direction_in_words(v, names) + " by 10 % changes all tracks together by " +
+          adjoint::direction_in_words(v, names) + by_a_tenth(s, v) + " changes all tracks together by " +
           short_text(0.1 * s.directions.singular_values[i], 2) + " standard deviations only.");
     }
   }
@@ -155,8 +174,7 @@ ExitCode run_sensitivity(VerbContext& context, const SensitivityOptions& options
   if (!used.hold.empty() && std::none_of(specs.begin(), specs.end(),
                                          [&](const ParameterSpec& p) { return p.address == used.hold; }))
     throw InputError("--hold", "'" + options.hold + "'", "one of the parameters that are studied");
-  if (scene_model.run_options().frames < 1)
-    throw InputError(context.options.file + ": /time/frames", "0", "at least one frame");
+  require_frames(scene_model.scene(), context.options.file);
   const std::string folder = context.output_folder();
 
   ExitCode code = ExitCode::ok;
@@ -169,7 +187,7 @@ ExitCode run_sensitivity(VerbContext& context, const SensitivityOptions& options
     adjoint::TangentResult tangent = adjoint::tangent_sweep(
         model, scene_model.native(), *run, adjoint::OuterDisplacements(model.mesh), space.jacobian());
     std::vector<int> kept;
-    drop_without_effect(s, space.specs(), tangent, kept);
+    drop_without_effect(s, space, tangent, kept);
     for (MatrixXd& frame : tangent.frames) frame = frame(Eigen::all, kept).eval();
     if (std::find(s.without_effect.begin(), s.without_effect.end(), used.hold) != s.without_effect.end())
       throw InputError("--hold", "'" + options.hold + "'", "a parameter that has an effect");

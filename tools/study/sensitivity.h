@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "adjoint/directions.h"
+#include "adjoint/parameter_space.h"
 #include "adjoint/surface_response.h"
 #include "sim/scene/parameter.h"
 #include "tools/study/experiment.h"
@@ -27,16 +28,17 @@ struct SensitivityOptions {
 
 /// The tables of a study, before they are written.
 struct Sensitivity {
-  std::vector<ParameterSpec> parameters;    ///< those with an effect
-  std::vector<std::string> without_effect;  ///< addresses
-  adjoint::SurfaceResponse response;        ///< by `parameters`
-  adjoint::Directions directions;           ///< of √tracks/noise · response.root
-  bool has_gauge = false;                   ///< "all stiffnesses together" leads the null vectors
-  VectorXd deviations;                      ///< of the coordinates, all free; infinite when open
-  int held = -1;                            ///< index into `parameters`; −1 = none
-  VectorXd held_deviations;                 ///< with it known (its own: 0)
-  MatrixXd correlation;                     ///< likewise; NaN for pairs that are open
-  std::vector<std::string> sentences;       ///< what positions cannot tell
+  std::vector<ParameterSpec> parameters;         ///< those with an effect
+  std::vector<adjoint::Coordinate> coordinates;  ///< of `parameters`
+  std::vector<std::string> without_effect;       ///< addresses
+  adjoint::SurfaceResponse response;             ///< by `parameters`
+  adjoint::Directions directions;                ///< of √tracks/noise · response.root
+  bool has_gauge = false;                        ///< "all stiffnesses together" leads the null vectors
+  VectorXd deviations;                           ///< of the coordinates, all free; infinite when open
+  int held = -1;                                 ///< index into `parameters`; −1 = none
+  VectorXd held_deviations;                      ///< with it known (its own: 0)
+  MatrixXd correlation;                          ///< likewise; NaN for pairs that are open
+  std::vector<std::string> sentences;            ///< what positions cannot tell
 
   double figure = 0;  ///< ⟨|u|²⟩ of the outer surface, mm², of the last frame or the mean over all
   VectorXd b, dJ_db;  ///< [columns] 1/mm, mm³; empty without ligaments

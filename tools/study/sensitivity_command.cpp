@@ -15,7 +15,8 @@ class SensitivityCommand final : public StudyCommand {
         "sensitivity",
         "what each parameter does to the surface, and what positions cannot tell",
         "Runs the scene once, converged for derivatives, and differentiates it by its parameters in log or "
-        "logit coordinates: how far a unit of each moves the outer surface; singular values of the Jacobian "
+        "logit coordinates (places in units of half of what a fit may move them): how far a unit of each "
+        "moves the outer surface; singular values of the Jacobian "
         "and the directions that positions cannot tell, by name; predicted standard deviations and "
         "correlations under a stated noise; and, by the adjoint, where on the face the ligament parameter "
         "b matters. All to first order, at the scene's own values.",
@@ -44,6 +45,8 @@ class SensitivityCommand final : public StudyCommand {
     app.add_flag("--all-frames", options_.map_all_frames,
                  "the map's figure is the mean over all frames, not that of the last");
   }
+
+  std::string variant() const override { return options_.variant; }
 
   ExitCode study(VerbContext& context) override {
     options_.size = size();

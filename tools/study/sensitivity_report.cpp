@@ -29,22 +29,32 @@ const char* transform_name(ParameterTransform t) {
   return t == ParameterTransform::log ? "log" : t == ParameterTransform::logit ? "logit" : "none";
 }
 
-/// A deviation of a coordinate as people read it: "3 %", "factor 2.1", of the odds for logit ones.
-std::string deviation_text(double deviation, ParameterTransform transform) {
-  constexpr double most = 3;  // a factor of 20 is as good as nothing
-  if (!std::isfinite(deviation)) return "open";
-  if (deviation == 0) return "held";
-  if (deviation < 0.3 || transform == ParameterTransform::none) return short_text(100 * deviation, 2) + " %";
-  const std::string of = transform == ParameterTransform::logit ? "odds factor " : "factor ";
-  return of + (deviation < most ? short_text(std::exp(deviation), 2) : "> " + short_text(std::exp(most), 2));
-}
-
 std::vector<int> strongest_first(const Sensitivity& s) {
   std::vector<int> order(s.parameters.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
                    [&](int a, int b) { return s.response.rms[a] > s.response.rms[b]; });
   return order;
+}
+
+/// "response_NAME" of every parameter, all different.
+std::vector<std::string> response_names(const Sensitivity& s) {
+  std::vector<std::string> names;
+  for (const ParameterSpec& p : s.parameters) names.push_back("response_" + p.name);
+  return file_names(names);
+}
+
+/// Of a parameter's row: name, value, unit of the coordinate, both responses, both deviations.
+std::vector<std::string> parameter_cells(const Sensitivity& s, int k) {
+  const ParameterSpec& p = s.parameters[k];
+  const adjoint::Coordinate& c = s.coordinates[k];
+  return {p.name,
+          short_text(p.value) + (p.unit.empty() ? "" : " " + p.unit),
+          coordinate_text(c, p.unit),
+          short_text(s.response.rms[k], 3),
+          short_text(s.response.largest[k], 3),
+          deviation_text(s.deviations[k], c, p.unit),
+          deviation_text(s.held_deviations[k], c, p.unit)};
 }
 
 std::string figure_name(const SensitivityOptions& options) {
@@ -59,6 +69,7 @@ void write_tables(const std::string& folder, const Sensitivity& s) {
                        {"unit", ""},
                        {"value", ""},
                        {"coordinate", ""},
+                       {"coordinate_unit", ""},
                        {"rms", "mm"},
                        {"max", "mm"},
                        {"rms_last_frame", "mm"},
@@ -70,7 +81,7 @@ void write_tables(const std::string& folder, const Sensitivity& s) {
     const ParameterSpec& p = s.parameters[k];
     const auto i = static_cast<Eigen::Index>(k);
     parameters.add_row({p.address, p.name, p.unit, p.value, std::string(transform_name(p.transform)),
-                        s.response.rms[i], s.response.largest[i],
+                        coordinate_text(s.coordinates[k], p.unit), s.response.rms[i], s.response.largest[i],
                         s.response.rms_of_frame(s.response.rms_of_frame.rows() - 1, i), s.deviations[i],
                         s.held_deviations[i]});
     frame_columns.push_back({p.address, "mm"});
@@ -119,9 +130,9 @@ void write_map(const std::string& folder, const SceneModel& scene_model, const S
   std::vector<OutputField> fields = {{"ligament_b_per_mm", 1, field(s.b)},
                                      {"dJ_db_mm3", 1, field(s.dJ_db)},
                                      {"share_per_cm2", 1, field(s.share)}};
+  const std::vector<std::string> files = response_names(s);
   for (std::size_t k = 0; k < s.parameters.size(); ++k)
-    fields.push_back({"response_" + file_name(s.parameters[k].name) + "_mm", 1,
-                      field(s.response.last.col(static_cast<Eigen::Index>(k)))});
+    fields.push_back({files[k] + "_mm", 1, field(s.response.last.col(static_cast<Eigen::Index>(k)))});
   write_vtp(folder + "/map.vtp", outer, scene_model.column_triangles(), fields);
   const double range = std::max(s.share.cwiseAbs().maxCoeff(), 1e-300);
   std::vector<Rgb> colours;
@@ -148,6 +159,7 @@ std::string json_text(const Sensitivity& s, const SensitivityOptions& options) {
                           {"unit", p.unit},
                           {"value", p.value},
                           {"coordinate", transform_name(p.transform)},
+                          {"coordinate_unit", coordinate_text(s.coordinates[k], p.unit)},
                           {"rms_mm", s.response.rms[i]},
                           {"max_mm", s.response.largest[i]},
                           {"deviation", number(s.deviations[i])},
@@ -159,6 +171,7 @@ std::string json_text(const Sensitivity& s, const SensitivityOptions& options) {
   const ordered_json all = {
       {"noise_mm", options.tracks.noise},
       {"tracks", options.tracks.count},
+      {"view", options.tracks.view ? list(*options.tracks.view) : ordered_json()},
       {"parameters", parameters},
       {"without_effect", s.without_effect},
       {"rank", s.directions.rank},
@@ -175,11 +188,12 @@ std::string json_text(const Sensitivity& s, const SensitivityOptions& options) {
 std::vector<StudyPicture> draw_responses(const std::string& folder, const SceneModel& scene_model,
                                          const Sensitivity& s, double end_time) {
   std::vector<StudyPicture> pictures;
+  const std::vector<std::string> files = response_names(s);
   std::size_t rank = 0;
   for (const int k : strongest_first(s)) {
     const ParameterSpec& p = s.parameters[k];
     if (++rank > kPictures && !p.address.starts_with("/ligaments/sources/")) continue;
-    const std::string file = "response_" + file_name(p.name) + ".png";
+    const std::string file = files[static_cast<std::size_t>(k)] + ".png";
     draw_on_skin(scene_model, s.response.last.col(k), "mm per unit", p.name, folder + "/" + file,
                  ColourMap::sequential, end_time);
     pictures.push_back({file, p.name});
@@ -189,14 +203,11 @@ std::vector<StudyPicture> draw_responses(const std::string& folder, const SceneM
 
 HtmlTable parameter_table(const Sensitivity& s) {
   HtmlTable table;
-  table.header = {"parameter", "value", "rms [mm]", "max [mm]", "all free", "one held"};
+  table.header = {"parameter", "value", "unit of coordinate", "rms [mm]", "max [mm]", "all free", "one held"};
   table.caption = "Motion of the surface per unit of each coordinate, and predicted standard deviations";
   for (const int k : strongest_first(s)) {
-    const ParameterSpec& p = s.parameters[k];
-    table.rows.push_back({p.name, short_text(p.value) + (p.unit.empty() ? "" : " " + p.unit),
-                          short_text(s.response.rms[k], 3), short_text(s.response.largest[k], 3),
-                          deviation_text(s.deviations[k], p.transform),
-                          deviation_text(s.held_deviations[k], p.transform)});
+    const std::vector<std::string> cells = parameter_cells(s, k);
+    table.rows.emplace_back(cells.begin(), cells.end());
   }
   return table;
 }
@@ -205,7 +216,7 @@ HtmlTable direction_table(const Sensitivity& s) {
   std::vector<std::string> names;
   for (const ParameterSpec& p : s.parameters) names.push_back(p.name);
   HtmlTable table;
-  table.header = {"direction", "singular value", "deviation"};
+  table.header = {"direction", "singular value", "deviation [units]"};
   table.caption = "Singular directions of the whitened Jacobian, best known first";
   for (Eigen::Index i = 0; i < s.directions.singular_values.size(); ++i) {
     const bool is_null = i >= s.directions.rank;
@@ -236,17 +247,12 @@ std::string rms_plot(const Sensitivity& s) {
 
 std::string sensitivity_text(const Sensitivity& s, const SensitivityOptions& options) {
   const std::string held = s.held >= 0 ? s.parameters[s.held].name + " held" : "none held";
-  TextTable table({"parameter", "value", "rms mm", "max mm", "all free", held});
-  for (const int k : strongest_first(s)) {
-    const ParameterSpec& p = s.parameters[k];
-    table.add({p.name, short_text(p.value) + (p.unit.empty() ? "" : " " + p.unit),
-               short_text(s.response.rms[k], 3), short_text(s.response.largest[k], 3),
-               deviation_text(s.deviations[k], p.transform),
-               deviation_text(s.held_deviations[k], p.transform)});
-  }
+  TextTable table({"parameter", "value", "unit", "rms mm", "max mm", "all free", held});
+  for (const int k : strongest_first(s)) table.add(parameter_cells(s, k));
   std::string text =
-      "Motion of the surface per unit of log or logit coordinate, and predicted deviations (of parameters,\n"
-      "of the odds of fractions) from " +
+      "Motion of the surface per unit of coordinate (a factor e of parameters or of the odds of fractions, "
+      "a\n"
+      "length for places), and predicted deviations from " +
       options.tracks.text() + "\n\n" + table.text() + "\n";
   if (!s.without_effect.empty()) {
     text += "Without effect:";
@@ -284,7 +290,8 @@ void write_sensitivity(const std::string& folder, const SceneModel& scene_model,
   page.section("parameters", "Parameters");
   page.paragraph(
       "How far a unit of each coordinate moves the outer surface (log parameters: a unit is a "
-      "factor e, so 10 % more is a tenth of it), to first order, as rms and largest value over "
+      "factor e, so 10 % more is a tenth of it; of the odds for fractions; a length for places), to first "
+      "order, as rms and largest value over "
       "surface and frames. Predicted standard deviations for " +
       options.tracks.text() + ": with all parameters free, and with " +
       (s.held >= 0 ? s.parameters[s.held].name + " known." : "none known."));

@@ -1,9 +1,13 @@
 #include "tools/study/study_command.h"
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
 
 namespace rhytid::tools {
+namespace {
+
+const std::string kSweep = "sweep";
+
+}  // namespace
 
 void StudyCommand::add_to(CLI::App& study) {
   const StudyHelp text = help();
@@ -12,10 +16,13 @@ void StudyCommand::add_to(CLI::App& study) {
   app_->footer(text.description + "\n\nReads    " + text.reads + "\nWrites   " + text.writes + "\nExample  " +
                text.example);
   app_->add_option("file", file_, file_help())->required()->option_text("FILE");
-  app_->add_option("-o,--output", output_,
-                   is_of_experiments()
-                       ? "folder for results (default run/<name of the experiment>_<size>)"
-                       : "folder for results (default run/<name of the scene>_" + text.name + ")")
+  app_->add_option(
+          "-o,--output", output_,
+          "folder for results (default run/<name of the file, or of its folder when it is called scene, "
+          "case or experiment>" +
+              (is_of_experiments() ? "_<size>" + (text.name == kSweep ? "" : "_" + text.name)
+                                   : "[_<variant>][_full]_" + text.name) +
+              ")")
       ->option_text("DIR");
   app_->add_option("--set", settings_, "change one value of the scene; repeatable")
       ->allow_extra_args(false)
@@ -24,6 +31,15 @@ void StudyCommand::add_to(CLI::App& study) {
       ->check(CLI::IsMember({"quick", "full"}))
       ->option_text("SIZE");
   add_options(*app_);
+}
+
+std::string StudyCommand::default_folder() const {
+  const std::string study = help().name;
+  std::string folder = default_output(file_);
+  if (is_of_experiments()) return folder + "_" + name(size()) + (study == kSweep ? "" : "_" + study);
+  if (!variant().empty()) folder += "_" + variant();
+  if (size() == StudySize::full) folder += "_full";
+  return folder + "_" + study;
 }
 
 bool StudyCommand::is_chosen() const {
@@ -35,10 +51,7 @@ ExitCode StudyCommand::run(VerbContext& context) {
   CommonOptions own = context.options;
   own.file = file_;
   own.settings = settings_;
-  const std::filesystem::path place = std::filesystem::absolute(file_).lexically_normal().parent_path();
-  own.output = !output_.empty()      ? output_
-               : is_of_experiments() ? "run/" + place.filename().string() + "_" + name(size())
-                                     : default_output(file_) + "_" + help().name;
+  own.output = output_.empty() ? default_folder() : output_;
   VerbContext inner{own, context.program, context.progress, context.out};
   return study(inner);
 }

@@ -35,12 +35,18 @@ class StudyCommand {
   virtual ExitCode study(VerbContext& context) = 0;
   /// FILE as --help describes it.
   virtual std::string file_help() const = 0;
-  /// Whether `file` is an experiment.json, the default folder for results then being run/FOLDER_SIZE.
+  /// Whether it runs all variants of an experiment, each into a folder of its own; else one scene.
   virtual bool is_of_experiments() const { return false; }
+  /// The variant asked for; empty = the first, or all.
+  virtual std::string variant() const { return ""; }
 
   StudySize size() const { return size_ == "full" ? StudySize::full : StudySize::quick; }
 
  private:
+  /// Where results go without -o: run/NAME_SIZE[_STUDY] of experiments (a sweep adds nothing), else
+  /// run/NAME[_VARIANT][_full]_STUDY.
+  std::string default_folder() const;
+
   CLI::App* app_ = nullptr;
   std::string file_, output_, size_ = "quick";
   std::vector<std::string> settings_;

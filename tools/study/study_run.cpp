@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "sim/core/digest.h"
 #include "sim/core/error.h"
@@ -96,15 +97,39 @@ std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vecto
   return specs;
 }
 
+void require_frames(const Scene& scene, const std::string& where) {
+  if (scene.time.frames < 1) throw InputError(where + ": /time/frames", "0", "at least one frame");
+}
+
 std::string PredictedTracks::text() const {
+  std::string seen = ", in three dimensions";
+  if (view) {
+    seen = ", seen along (";
+    for (const double x : *view) seen += (seen.back() == '(' ? "" : ", ") + short_text(x);
+    seen += ")";
+  }
   return std::to_string(count) + " tracks spread evenly over the surface, in every frame, noise " +
-         short_text(noise) + " mm per component" +
-         (view ? ", seen along one direction" : ", in three dimensions");
+         short_text(noise) + " mm per component" + seen;
+}
+
+bool is_size(double value) {
+  return value >= 1e-9 && value <= 1e9;
+}
+
+CLI::Validator size_check() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        return parse(text, value) && is_size(value)
+                   ? std::string()
+                   : "got '" + text + "', expected a number from 1e-9 to 1e9";
+      },
+      "");
 }
 
 void add_track_options(CLI::App& app, PredictedTracks& tracks) {
   app.add_option("--noise", tracks.noise, "of each component of a track in each frame, mm (default 0.01)")
-      ->check(CLI::PositiveNumber)
+      ->check(size_check())
       ->option_text("MM");
   app.add_option("--tracks", tracks.count, "tracks spread evenly over the surface (default 200)")
       ->check(CLI::Range(1, 100000000))
@@ -112,19 +137,34 @@ void add_track_options(CLI::App& app, PredictedTracks& tracks) {
   app.add_option_function<std::vector<double>>(
          "--view",
          [&tracks](const std::vector<double>& view) {
-           tracks.view = Vec3(view[0], view[1], view[2]);
-           if (!(tracks.view->norm() > 0)) throw InputError("--view", "0 0 0", "a direction");
+           const Vec3 direction(view[0], view[1], view[2]);
+           if (!direction.allFinite() || direction == Vec3::Zero())
+             throw InputError("--view",
+                              short_text(view[0]) + " " + short_text(view[1]) + " " + short_text(view[2]),
+                              "a direction, three finite numbers that are not all zero");
+           tracks.view = direction.stableNormalized();
          },
          "direction of sight: motion along it is not seen (default: all is)")
       ->expected(3)
       ->option_text("X Y Z");
 }
 
-std::string file_name(const std::string& text) {
-  std::string name = text;
-  for (char& c : name)
-    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '_';
-  return name;
+std::vector<std::string> file_names(const std::vector<std::string>& texts) {
+  std::vector<std::string> names;
+  std::set<std::string> taken;  // in small letters
+  for (const std::string& text : texts) {
+    std::string name = text;
+    for (char& c : name)
+      if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '_';
+    const auto is_taken = [&](std::string wanted) {
+      for (char& c : wanted) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+      return !taken.insert(wanted).second;
+    };
+    std::string unique = name;
+    for (int count = 2; is_taken(unique); ++count) unique = name + "_" + std::to_string(count);
+    names.push_back(std::move(unique));
+  }
+  return names;
 }
 
 PictureOptions skin_from_above(const SubdividedSurface& outer) {

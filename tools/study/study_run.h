@@ -14,6 +14,10 @@
 #include "tools/study/variant_result.h"
 #include "tools/verb.h"
 
+namespace CLI {
+class Validator;
+}
+
 namespace rhytid::tools {
 
 /// Part `index` of `count` of a study's runs, for several machines: run i belongs to part 1 + i mod count.
@@ -45,11 +49,14 @@ VariantIdentity study_identity(const Scene& scene, const Model& model, const std
 /// paths), which per cents say nothing of. Throws InputError for one that it has not, or that is given twice.
 std::vector<ParameterSpec> study_parameters(const Scene& scene, const std::vector<std::string>& addresses);
 
+/// Throws InputError naming `where` for a scene of no frame: it has nothing to measure.
+void require_frames(const Scene& scene, const std::string& where);
+
 /// Tracks that a study predicts with, spread evenly over the outer surface and seen in every frame.
 struct PredictedTracks {
   double noise = 0.01;  ///< mm, of each component of a track in each frame
   int count = 200;
-  std::optional<Vec3> view;  ///< direction of sight: what moves along it is not seen
+  std::optional<Vec3> view;  ///< direction of sight, of length 1: what moves along it is not seen
   /// What adjoint::SurfaceResponse::root is multiplied by to be whitened, 1/mm.
   double weight() const { return std::sqrt(static_cast<double>(count)) / noise; }
   /// "200 tracks spread evenly ...", without a full stop.
@@ -59,8 +66,14 @@ struct PredictedTracks {
 /// Options --noise, --tracks and --view. CLI11 writes into `tracks`, which must live as long as `app`.
 void add_track_options(CLI::App& app, PredictedTracks& tracks);
 
-/// A name for files: letters, digits and _ . - stay, the rest becomes _.
-std::string file_name(const std::string& text);
+/// Whether a noise, a prior or the like can be calculated with: 1e-9 to 1e9, and not what is no number.
+bool is_size(double value);
+/// The same as a check of an option.
+CLI::Validator size_check();
+
+/// Names for files: letters, digits, . and - stay, the rest becomes _. Those that would be the same get numbers,
+/// also where capitals are all that differs.
+std::vector<std::string> file_names(const std::vector<std::string>& texts);
 
 /// Draws a scalar on the outer skin, seen from above: `values` per column. `solids_at` adds the colliders at
 /// that time as thin glass, and the ligament sources as black dots.

@@ -3,6 +3,8 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <ostream>
@@ -12,6 +14,7 @@
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
 #include "tools/forward_run.h"
+#include "tools/study/parameter_sets.h"
 #include "tools/study/study_run.h"
 #include "tools/study/sweep_report.h"
 #include "tools/study/variant_result.h"
@@ -19,6 +22,14 @@
 
 namespace rhytid::tools {
 namespace {
+
+/// Tables read the results of all runs: made after every run they would take the square of a large grid's
+/// time. They wait until so many times what they last took has gone by.
+constexpr double kBetweenTables = 20;
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 /// The largest resident memory since the last call, MB; 0 where the system does not tell. What other variants
 /// have left to the allocator goes back first, so that it does not count for the next.
@@ -46,7 +57,12 @@ class Sweep {
         throw InputError("--only", "'" + name + "'", "one of " + variant_names(experiment_));
     // All models are built first: what is wrong with the last shows before the first runs.
     for (const Variant& v : experiment_.variants)
-      if (is_wanted(v)) identities_[v.name] = identity_of(v);
+      if (is_wanted(v)) {
+        if (is_of_plan(folder_of(v)))
+          throw InputError(folder_of(v), "a swipe of `study plan`",
+                           "a folder of its own for the sweep, by -o");
+        identities_[v.name] = identity_of(v);
+      }
     context_.output_folder();
     for (const Variant& v : experiment_.variants)
       if (!is_wanted(v)) identify_earlier(v);
@@ -54,9 +70,18 @@ class Sweep {
     for (const Variant& v : experiment_.variants) {
       if (!is_wanted(v)) continue;
       const ExitCode code = run(v);
-      report();
-      if (code == ExitCode::interrupted) return code;
+      if (code == ExitCode::interrupted) {
+        report();
+        return code;
+      }
+      if (now() >= next_report_) report();
       if (code != ExitCode::ok) worst = code;
+    }
+    report();
+    if (is_part()) {
+      context_.out << "part " << options_.shard.index << " of " << options_.shard.count << " is in "
+                   << folder_ << "; the same command without --shard makes the tables\n";
+      return worst;
     }
     context_.out << "written to " << folder_
                  << ": results.csv, results.md, index.html, and a folder per variant\n";
@@ -81,6 +106,7 @@ class Sweep {
   /// What the variant's result depends on. Throws InputError when it cannot be run or measured.
   VariantIdentity identity_of(const Variant& v) const {
     try {
+      check_swept_values(experiment_, v, context_.options.settings);
       const SceneModel built(load_scene(experiment_.scene, settings_of(v)));
       place_samples(built.model().mesh, experiment_.measure);
       return study_identity(built.scene(), built.model(), experiment_.measure_json.dump());
@@ -162,12 +188,18 @@ class Sweep {
     return text.empty() ? text : text + ".";
   }
 
-  void report() const {
+  bool is_part() const { return options_.shard.count > 1; }
+
+  /// Tables and page. Not of a part: other machines may be writing theirs into the same folder.
+  void report() {
+    if (is_part()) return;
+    const double start = now();
     std::vector<VariantResult> results;
     std::string reason;
     for (const Variant& v : experiment_.variants)
       if (auto result = current(v, reason)) results.push_back(std::move(*result));
     write_sweep_report(folder_, experiment_, results, left_out());
+    next_report_ = now() + kBetweenTables * (now() - start);
   }
 
   VerbContext& context_;
@@ -175,6 +207,7 @@ class Sweep {
   std::string folder_;
   const SweepOptions& options_;
   std::map<std::string, VariantIdentity> identities_;  ///< by name, of variants that can be built
+  double next_report_ = 0;                             ///< s
 };
 
 }  // namespace

@@ -24,7 +24,7 @@ struct SweepOptions {
 /// Builds the models of all variants asked for, then runs what is not finished and writes results.csv,
 /// results.md and index.html into context.options.output, with context.options.settings applied last to every
 /// variant. Results of other settings, files or programs are left out, and said to be. Exit code: that of the
-/// worst variant; interrupted when stopped. Throws InputError before anything is written when a variant
+/// worst variant; interrupted when stopped. A shard writes no tables. Throws InputError before anything is written when a variant
 /// cannot be built or measured.
 ExitCode run_sweep(VerbContext& context, const Experiment& experiment, const SweepOptions& options);
 

@@ -1,7 +1,6 @@
 // rhytid study sweep: every variant of an experiment, or of a scene every set of a grid or a table.
 #include <CLI/CLI.hpp>
 
-#include "sim/core/error.h"
 #include "tools/study/parameter_sets.h"
 #include "tools/study/study_command.h"
 #include "tools/study/study_run.h"
@@ -19,7 +18,8 @@ class SweepCommand final : public StudyCommand {
         "Runs an experiment's variants one after the other and measures their wrinkles after every frame. "
         "With --grid or --csv each variant, or the scene itself, is run with every set of values. The same "
         "command goes on after a stop; with --shard I/N each of N machines runs its part into the same "
-        "folder, and a last call without it makes the tables of all.",
+        "folder and makes no tables: a last call without it makes those of all. Tables of a sweep that goes "
+        "on are made now and then, and at its end.",
         "experiment.json and its scene, or with --grid or --csv a scene; the table of --csv has addresses "
         "for columns (and maybe name) and a row per run",
         "results.csv, results.md, index.html and a folder per run with the files of `simulate`",
@@ -48,10 +48,6 @@ class SweepCommand final : public StudyCommand {
     const bool has_sets = !grid_.empty() || !csv_.empty();
     if (!has_sets) return run_sweep(context, load_experiment(file, size()), options_);
     const std::vector<ParameterSet> sets = csv_.empty() ? grid_sets(grid_) : table_sets(csv_);
-    for (const std::string& setting : context.options.settings)
-      for (const SweptValue& value : sets.front().values)
-        if (setting.starts_with(value.address + "="))
-          throw InputError("--set", setting + ", which the sweep sets in every run", "another address");
     const Experiment base = is_experiment(file) ? load_experiment(file, size()) : experiment_of_scene(file);
     return run_sweep(context, with_parameter_sets(base, sets), options_);
   }

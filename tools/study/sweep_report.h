@@ -9,7 +9,7 @@
 
 namespace rhytid::tools {
 
-/// Names of the files that write_sweep_report may leave in its folder.
+/// Names of the files that write_sweep_report may leave in its folder, which no variant may have.
 const std::vector<std::string>& sweep_files();
 
 /// results.csv: a row per result, every number. results.md: the same as Markdown, rounded. index.html: one

@@ -108,6 +108,18 @@ void write_variant(const std::string& folder, const VariantResult& result) {
   write_file(folder + "/variant.json", j.dump(2) + "\n");
 }
 
+bool is_of_run(const std::string& folder) {
+  if (std::filesystem::exists(folder + "/run.json")) return true;
+  const auto result = read_variant(folder);
+  return result && !result->finished();  // a plan keeps nothing of a swipe before its end
+}
+
+bool is_of_plan(const std::string& folder) {
+  const auto result = read_variant(folder);
+  return result && result->finished() &&
+         (result->columns.empty() || result->columns.front().name.starts_with("root_"));
+}
+
 std::vector<ResultColumn> read_results(const std::string& folder) {
   std::vector<ResultColumn> columns;
   const json run = json::parse(read_file(folder + "/run.json"));

@@ -42,6 +42,11 @@ std::optional<VariantResult> read_variant(const std::string& folder);
 /// Writes it atomically. Throws InputError naming the path.
 void write_variant(const std::string& folder, const VariantResult& result);
 
+/// Whether the folder has what `study plan` keeps of a swipe, or what `simulate` and a sweep write: each takes
+/// folders of its own.
+bool is_of_plan(const std::string& folder);
+bool is_of_run(const std::string& folder);
+
 /// Reads the numbers of a run from the files it left in `folder`: sizes and times of run.json, sums, extremes
 /// and last values of steps.csv, last row of wrinkles.csv.
 std::vector<ResultColumn> read_results(const std::string& folder);
