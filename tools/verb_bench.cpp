@@ -12,9 +12,9 @@ class Bench : public Verb {
   VerbHelp help() const override {
     return {
         "bench",
-        "benchmarks of the simulator: tables of stability",
-        "Runs one benchmark on scenes of its own and writes its tables. `stability` takes every setting to "
-        "its extremes on a small scene.",
+        "benchmarks of the simulator: stability, time of every stage, gradients, tolerances, memory",
+        "Runs one benchmark and writes its tables. `stability` takes every setting to its extremes on a small "
+        "scene; the others measure a drag over a patch of any size, or a scene of yours (--scene).",
         "nothing",
         "tables (CSV, Markdown) into -o DIR, and a short account on stdout",
         "rhytid bench stability --quick -o run/stability"};

@@ -2,6 +2,7 @@
 // iteration i may write only to what belongs to i, and sums over i are done by the caller in index order.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <utility>
@@ -37,6 +38,26 @@ void parallel_for(std::int64_t n, Fn&& fn) {
       }
     }
   }
+  if (failure) std::rethrow_exception(std::move(failure));
+}
+
+/// The same, with iterations handed out one by one, in order, to whichever thread is free: for work of uneven
+/// size.
+template <class Fn>
+void parallel_for_uneven(std::int64_t n, Fn&& fn) {
+  std::atomic<std::int64_t> next{0};
+  std::int64_t first_failure = n;
+  std::exception_ptr failure;
+#pragma omp parallel num_threads(num_threads())
+  for (std::int64_t i = next++; i < n; i = next++) try {
+      fn(i);
+    } catch (...) {
+#pragma omp critical(rhytid_parallel_failure)
+      if (i < first_failure) {
+        first_failure = i;
+        failure = std::current_exception();
+      }
+    }
   if (failure) std::rethrow_exception(std::move(failure));
 }
 

@@ -13,6 +13,28 @@
 namespace rhytid {
 inline namespace RHYTID_ISA {
 
+/// (e^z − 1)/z, 1 at z = 0.
+inline double relative_expm1(double z) {
+  if (z > -0.1 && z < 0.1) {  // the first term left out is z¹¹/12!, 2e-20 at the switch
+    double sum = 1;
+    for (int k = 11; k >= 2; --k) sum = 1 + z / k * sum;
+    return sum;
+  }
+  return std::expm1(z) / z;
+}
+/// Its derivative, Σ_k k z^(k−1)/(k+1)!.
+inline double relative_expm1_slope(double z) {
+  if (z > -0.1 && z < 0.1) {
+    double sum = 0, factorial = 479001600;  // 12!
+    for (int k = 11; k >= 1; --k) {
+      sum = sum * z + k / factorial;
+      factorial /= k + 1;
+    }
+    return sum;
+  }
+  return (std::exp(z) - std::expm1(z) / z) / z;
+}
+
 template <int N>
 struct Dual {
   double v = 0;   ///< value
@@ -96,6 +118,9 @@ struct Dual {
   }
   friend Dual log1p(const Dual& a) { return chain(a, std::log1p(a.v), 1.0 / (1.0 + a.v)); }
   friend Dual log(const Dual& a) { return chain(a, std::log(a.v), 1.0 / a.v); }
+  friend Dual relative_expm1(const Dual& a) {
+    return chain(a, relative_expm1(a.v), relative_expm1_slope(a.v));
+  }
   friend Dual sqrt(const Dual& a) {
     const double f = std::sqrt(a.v);
     return chain(a, f, 0.5 / f);

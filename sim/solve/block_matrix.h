@@ -54,9 +54,9 @@ class BlockMatrix {
   std::vector<double> values_;
 };
 
-/// Supernodal Cholesky of a BlockMatrix through CHOLMOD over OpenBLAS. Symbolic analysis once per factor
-/// object; the pattern must outlive it. Runs on the calling thread alone, so that the factor does not depend
-/// on the number of threads. Throws std::bad_alloc or std::length_error when the factor does not fit.
+/// Supernodal Cholesky over OpenBLAS: CHOLMOD analyses once per object, whose pattern must outlive it, and
+/// solves on the calling thread; numbers come from num_threads() threads, with the same bits for any number of
+/// them (supernodal_cholesky.h). Throws std::bad_alloc or std::length_error when the factor does not fit.
 class CholeskyFactor {
  public:
   explicit CholeskyFactor(const BlockPattern& pattern);
@@ -74,6 +74,7 @@ class CholeskyFactor {
   double smallest_pivot() const;
   double largest_pivot() const;
   std::size_t factor_entries() const;  ///< nnz(L) stored
+  double factor_flops() const;         ///< floating-point operations of one factorisation, by the analysis
 
  private:
   struct Impl;

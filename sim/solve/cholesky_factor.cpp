@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "sim/core/error.h"
 #include "sim/solve/block_matrix.h"
 #include "sim/solve/block_pattern_impl.h"
 #include "sim/solve/cholmod_session.h"
+#include "sim/solve/supernodal_cholesky.h"
 
 namespace rhytid {
 
@@ -16,31 +18,33 @@ struct CholeskyFactor::Impl {
   const BlockPattern* pattern;
   // CHOLMOD writes its workspace and status into the session even when it only solves.
   mutable CholmodSession session;
-  cholmod_sparse matrix{};  ///< a view of the pattern and of the values last factorised; owns nothing
   cholmod_factor* factor = nullptr;
+  std::optional<SupernodalCholesky> numbers;
   bool usable = false;
-  double smallest_pivot = 0, largest_pivot = 0;
+  double smallest_pivot = 0, largest_pivot = 0, flops = 0;
 
   void measure_pivots();
 };
 
 CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
   const BlockPattern::Impl& impl = p.impl();
-  // Already in fill-reducing postorder: with the natural order and the lower triangle, CHOLMOD reads the
-  // values in place instead of permuting and transposing them at every factorisation.
+  // Already in fill-reducing postorder: with the natural order the values are read in place.
   session->nmethods = 1;
   session->method[0].ordering = CHOLMOD_NATURAL;
   session->postorder = 0;
   session->supernodal = CHOLMOD_SUPERNODAL;
-  session->quick_return_if_not_posdef = 1;
 
-  matrix =
+  cholmod_sparse matrix =
       lower_pattern(static_cast<std::size_t>(p.num_unknowns()), static_cast<std::size_t>(p.num_entries()),
                     impl.scalar_column_start.data(), impl.scalar_rows.data());
   const SingleThreadScope single_thread;
   factor = cholmod_analyze(&matrix, &session);
-  matrix.xtype = CHOLMOD_REAL;
   if (!factor) throw_on_cholmod_error(*&session);
+  flops = session->fl;
+  cholmod_change_factor(CHOLMOD_REAL, /*to_ll=*/1, /*to_super=*/1, /*to_packed=*/1, /*to_monotonic=*/1,
+                        factor, &session);
+  throw_on_cholmod_error(*&session);
+  numbers.emplace(*factor);
 }
 
 void CholeskyFactor::Impl::measure_pivots() {
@@ -74,13 +78,11 @@ bool CholeskyFactor::factorize(const BlockMatrix& matrix, double shift) {
   require(&matrix.pattern() == impl.pattern, "CholeskyFactor::factorize: the matrix has another pattern");
   impl.usable = false;
   impl.smallest_pivot = impl.largest_pivot = 0;
-  impl.matrix.x = const_cast<double*>(matrix.values().data());
-  double beta[2] = {shift, 0};
-  const SingleThreadScope single_thread;
-  impl.session->status = CHOLMOD_OK;
-  cholmod_factorize_p(&impl.matrix, beta, nullptr, 0, impl.factor, &impl.session);
-  throw_on_cholmod_error(*&impl.session);
-  if (impl.session->status == CHOLMOD_OK && impl.factor->minor == impl.factor->n) impl.measure_pivots();
+  const BlockPattern::Impl& p = impl.pattern->impl();
+  const SingleThreadBlas blas;
+  if (impl.numbers->factorize(p.scalar_column_start.data(), p.scalar_rows.data(), matrix.values().data(),
+                              shift))
+    impl.measure_pivots();
   return impl.usable;
 }
 
@@ -135,6 +137,9 @@ double CholeskyFactor::largest_pivot() const {
 }
 std::size_t CholeskyFactor::factor_entries() const {
   return impl_->factor->xsize;
+}
+double CholeskyFactor::factor_flops() const {
+  return impl_->flops;
 }
 
 }  // namespace rhytid

@@ -13,15 +13,20 @@ int openblas_get_num_threads(void);
 
 namespace rhytid {
 
-SingleThreadScope::SingleThreadScope()
-    : active_levels_(omp_get_max_active_levels()), blas_threads_(openblas_get_num_threads()) {
-  omp_set_max_active_levels(0);
+SingleThreadBlas::SingleThreadBlas() : blas_threads_(openblas_get_num_threads()) {
   if (blas_threads_ != 1) openblas_set_num_threads(1);
+}
+
+SingleThreadBlas::~SingleThreadBlas() {
+  if (blas_threads_ != 1) openblas_set_num_threads(blas_threads_);
+}
+
+SingleThreadScope::SingleThreadScope() : active_levels_(omp_get_max_active_levels()) {
+  omp_set_max_active_levels(0);
 }
 
 SingleThreadScope::~SingleThreadScope() {
   omp_set_max_active_levels(active_levels_);
-  if (blas_threads_ != 1) openblas_set_num_threads(blas_threads_);
 }
 
 cholmod_sparse lower_pattern(std::size_t size, std::size_t num_entries, const int* column_start,

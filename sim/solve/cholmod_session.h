@@ -27,6 +27,18 @@ class CholmodSession {
   cholmod_common common_;
 };
 
+/// While alive, OpenBLAS runs every call on the thread that makes it.
+class SingleThreadBlas {
+ public:
+  SingleThreadBlas();
+  ~SingleThreadBlas();
+  SingleThreadBlas(const SingleThreadBlas&) = delete;
+  SingleThreadBlas& operator=(const SingleThreadBlas&) = delete;
+
+ private:
+  int blas_threads_;
+};
+
 /// While alive, this thread's calls into CHOLMOD and OpenBLAS run on this thread alone. CHOLMOD 3's OpenMP
 /// regions carry a hard-coded num_threads(4), which the environment's thread count does not override; with no
 /// active level allowed, the OpenMP runtime runs them on the calling thread.
@@ -38,7 +50,8 @@ class SingleThreadScope {
   SingleThreadScope& operator=(const SingleThreadScope&) = delete;
 
  private:
-  int active_levels_, blas_threads_;
+  SingleThreadBlas blas_;
+  int active_levels_;
 };
 
 /// A view of the lower triangle of a symmetric pattern by columns, rows sorted: no values, owns nothing

@@ -16,7 +16,7 @@
 
 #include <cmath>
 
-#include "sim/math/dual.h"
+#include "sim/math/reverse.h"
 #include "sim/scene/damper_scheme.h"
 
 namespace rhytid {
@@ -58,6 +58,24 @@ Damper<T> damper(DamperScheme scheme, const T& tau, double dt) {
       break;
   }
   return {T(0.0), T(1.0), T(0.0)};
+}
+
+/// The same, recorded: three functions of τ.
+template <class V>
+Damper<Reverse<V>> damper(DamperScheme scheme, const Reverse<V>& tau, double dt) {
+  const auto number = [&](auto member, bool slope) {
+    return map_lanes(
+        [&](double at) {
+          const Dual<1> d = damper(scheme, Dual<1>::variable(at, 0), dt).*member;
+          return slope ? d.d[0] : d.v;
+        },
+        tau.v);
+  };
+  const auto recorded = [&](auto member) {
+    return Reverse<V>::unary(tau, number(member, false), number(member, true));
+  };
+  using D = Damper<Dual<1>>;
+  return {recorded(&D::pre), recorded(&D::weight), recorded(&D::post)};
 }
 
 }  // namespace RHYTID_ISA

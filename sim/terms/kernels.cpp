@@ -3,7 +3,7 @@
 #include <cstring>
 
 #include "sim/terms/contact_law.h"
-#include "sim/terms/kernel_table.h"
+#include "sim/terms/make_kernel_table.h"
 #include "sim/terms/ligament_law.h"
 
 namespace rhytid {

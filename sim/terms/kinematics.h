@@ -13,28 +13,9 @@
 
 #include "sim/math/lanes.h"
 #include "sim/math/sym3.h"
+#include "sim/terms/element_view.h"
 
 namespace rhytid {
-
-/// Directions that one tangent kernel call carries.
-inline constexpr int kDirections = 8;
-/// Rows of the table that one Hessian pass treats; a multiple of R.
-inline constexpr int kHessianRows = 24;
-
-/// Everything an element kernel reads, as plain pointers (see the shapes above; null where a law has none).
-struct ElementView {
-  int num_nodes, padded_nodes;     ///< n, npad (multiple of 8)
-  int num_points;                  ///< nq
-  int padded_rows;                 ///< length of a row of `rows_by_node`, ≥ nq·R, multiple of 8
-  const double* node_by_row;       ///< [nq·R][npad]
-  const double* rows_by_node;      ///< [n][padded_rows], the transpose
-  const double* inverse_jacobian;  ///< prisms: [nq][3][3] ∂ξ_r/∂X_I; surfaces: null
-  const double* weight;            ///< [nq] integration weight, mm³ or mm²
-  const double* rest;              ///< [nq][nrest]
-  const double* theta;             ///< [nq][ntheta], or one row when theta_stride = 0
-  int theta_stride;
-  double dt;  ///< s
-};
 
 inline namespace RHYTID_ISA {
 
@@ -106,10 +87,12 @@ struct SurfaceKinematics {
       for (int j = 0; j < 3; ++j) b[i][j] = i == j;
   }
   static void add_geometric(const double*, double (*)[3]) {}
-  static void to_point(const double* natural, const double*, double* u) {
-    std::memcpy(u, natural, 3 * sizeof(double));
+  template <class V>
+  static void to_point(const V* natural, const V*, V* u) {
+    for (int a = 0; a < 3; ++a) u[a] = natural[a];
   }
-  static void from_point(const double* p, const double*, double weight, double* natural) {
+  template <class V>
+  static void from_point(const V* p, const V*, V weight, V* natural) {
     for (int a = 0; a < 3; ++a) natural[a] = weight * p[a];
   }
 };

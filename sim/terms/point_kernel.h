@@ -21,6 +21,7 @@
 #include "sim/terms/element_sums.h"
 #include "sim/terms/kinematics.h"
 #include "sim/terms/packed_kernel.h"
+#include "sim/terms/reverse_kernel.h"
 #include "sim/terms/term_energies.h"
 
 namespace rhytid {
@@ -287,6 +288,12 @@ struct PointKernel {
   }
 
   using Directions = Dual<kDirections>;
+  static_assert(kDirections % kLanes == 0);
+
+  static void load_jacobian(const ElementView& v, int q, Lanes* jacobian) {
+    if constexpr (R == 3)
+      for (int i = 0; i < 9; ++i) jacobian[i] = broadcast<Lanes>(v.inverse_jacobian[9 * q + i]);
+  }
 
   /// A strain as a dual along kDirections nodal directions du [n][3][kDirections] (null = zero derivative).
   static void seed_strain(const ElementView& v, const double (*natural)[max_rows], const double* du, int q,
@@ -296,21 +303,27 @@ struct PointKernel {
     Kin::strain(z, value);
     for (int c = 0; c < ne; ++c) e[c] = Directions(value[c]);
     if (!du) return;
-    double local[nz][kDirections] = {};
-    for (int i = 0; i < v.num_nodes; ++i)
-      for (int r = 0; r < R; ++r) {
-        const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
-        for (int a = 0; a < 3; ++a)
-          for (int k = 0; k < kDirections; ++k) local[a * R + r][k] += t * du[(3 * i + a) * kDirections + k];
-      }
+    Lanes jacobian[9] = {};
+    load_jacobian(v, q, jacobian);
     double b[ne][nz];
     Kin::strain_gradient(z, b);
-    for (int k = 0; k < kDirections; ++k) {
-      double column[nz], dz[nz];
-      for (int i = 0; i < nz; ++i) column[i] = local[i][k];
-      Kin::to_point(column, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, dz);
-      for (int c = 0; c < ne; ++c)
-        for (int i = 0; i < nz; ++i) e[c].d[k] += b[c][i] * dz[i];
+    for (int k = 0; k < kDirections; k += kLanes) {
+      Lanes local[nz] = {}, dz[nz];
+      for (int i = 0; i < v.num_nodes; ++i) {
+        Lanes node[3];
+        for (int a = 0; a < 3; ++a)
+          std::memcpy(&node[a], du + (3 * static_cast<std::size_t>(i) + a) * kDirections + k, sizeof(Lanes));
+        for (int r = 0; r < R; ++r) {
+          const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
+          for (int a = 0; a < 3; ++a) local[a * R + r] += t * node[a];
+        }
+      }
+      Kin::to_point(local, jacobian, dz);
+      for (int c = 0; c < ne; ++c) {
+        Lanes sum = {};
+        for (int i = 0; i < nz; ++i) sum += b[c][i] * dz[i];
+        std::memcpy(e[c].d + k, &sum, sizeof sum);
+      }
     }
   }
 
@@ -326,10 +339,11 @@ struct PointKernel {
     for (int q = 0; q < v.num_points; ++q) {
       Directions e[ne], e_old[ne], s[at_least_one(ns)], th[nt], prepared[at_least_one(np)];
       seed_strain(v, natural_old, du_old, q, e_old);
-      for (int c = 0; c < ns; ++c) {
-        s[c] = s_old[q * ns + c];
-        if (ds_old) std::memcpy(s[c].d, ds_old + (q * ns + c) * kDirections, sizeof s[c].d);
-      }
+      if constexpr (ns > 0)
+        for (int c = 0; c < ns; ++c) {
+          s[c] = s_old[q * ns + c];
+          if (ds_old) std::memcpy(s[c].d, ds_old + (q * ns + c) * kDirections, sizeof s[c].d);
+        }
       for (int c = 0; c < nt; ++c) {
         th[c] = theta(v, q)[c];
         if (dtheta) std::memcpy(th[c].d, dtheta + (q * nt + c) * kDirections, sizeof th[c].d);
@@ -342,18 +356,26 @@ struct PointKernel {
         (void)law.template stress<Directions>(e, prepared, th, rest(v, q), v.dt, sigma);
         point(v, natural, q, z);
         Kin::strain_gradient(z, b);
-        for (int k = 0; k < kDirections; ++k) {
-          double p[nz], local[nz];
-          for (int i = 0; i < nz; ++i) {
-            p[i] = 0;
-            for (int c = 0; c < ne; ++c) p[i] += sigma[c].d[k] * b[c][i];
+        Lanes jacobian[9] = {};
+        load_jacobian(v, q, jacobian);
+        for (int k = 0; k < kDirections; k += kLanes) {
+          Lanes p[nz] = {}, local[nz];
+          for (int c = 0; c < ne; ++c) {
+            Lanes along;
+            std::memcpy(&along, sigma[c].d + k, sizeof along);
+            for (int i = 0; i < nz; ++i) p[i] += b[c][i] * along;
           }
-          Kin::from_point(p, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, v.weight[q], local);
-          for (int i = 0; i < v.num_nodes; ++i)
+          Kin::from_point(p, jacobian, broadcast<Lanes>(v.weight[q]), local);
+          for (int i = 0; i < v.num_nodes; ++i) {
+            double* const at = df + 3 * static_cast<std::size_t>(i) * kDirections + k;
+            Lanes node[3];
+            for (int a = 0; a < 3; ++a) std::memcpy(&node[a], at + a * kDirections, sizeof(Lanes));
             for (int r = 0; r < R; ++r) {
               const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
-              for (int a = 0; a < 3; ++a) df[(3 * i + a) * kDirections + k] += t * local[a * R + r];
+              for (int a = 0; a < 3; ++a) node[a] += t * local[a * R + r];
             }
+            for (int a = 0; a < 3; ++a) std::memcpy(at + a * kDirections, &node[a], sizeof(Lanes));
+          }
         }
       }
       if constexpr (ns > 0) {
@@ -371,6 +393,14 @@ struct PointKernel {
   /// Adds (∂s_new/∂u)ᵀ s_bar to u_bar [n][3].
   static void adjoint_update(const Law& law, const ElementView& v, const double* u, const double* prepared,
                              const double* s_bar, double* u_bar) {
+    if constexpr (R == 3)
+      ReverseKernel<Law, Kin>::adjoint_update(law, v, u, prepared, s_bar, u_bar);
+    else
+      adjoint_update_by_points(law, v, u, prepared, s_bar, u_bar);
+  }
+  /// The same by dual numbers.
+  static void adjoint_update_by_points(const Law& law, const ElementView& v, const double* u,
+                                       const double* prepared, const double* s_bar, double* u_bar) {
     if constexpr (ns > 0) {
       double natural[3][max_rows], out[3][max_rows];
       gather<R>(v, u, natural);
@@ -403,6 +433,17 @@ struct PointKernel {
   static void adjoint_step(const Law& law, const ElementView& v, const double* u, const double* u_old,
                            const double* s_old, const double* prepared, const double* adj,
                            const double* s_bar, double* u_old_bar, double* s_old_bar, double* theta_bar) {
+    if constexpr (R == 3)
+      ReverseKernel<Law, Kin>::adjoint_step(law, v, u, u_old, s_old, prepared, adj, s_bar, u_old_bar,
+                                            s_old_bar, theta_bar);
+    else
+      adjoint_step_by_points(law, v, u, u_old, s_old, prepared, adj, s_bar, u_old_bar, s_old_bar, theta_bar);
+  }
+  /// The same by dual numbers.
+  static void adjoint_step_by_points(const Law& law, const ElementView& v, const double* u,
+                                     const double* u_old, const double* s_old, const double* prepared,
+                                     const double* adj, const double* s_bar, double* u_old_bar,
+                                     double* s_old_bar, double* theta_bar) {
     constexpr int nd = np + nt, no = ne + ns + nt;
     double natural[3][max_rows], natural_old[3][max_rows], natural_adj[3][max_rows], out[3][max_rows];
     gather<R>(v, u, natural);

@@ -60,9 +60,7 @@ T equilibrium(const T* y, const T* theta, double volume, T* n) {
   const T pressure = bulk * jm1 * (jm1 + 1.0);
   for (int c = 0; c < 6; ++c) n[c] = factor * n[c];
   for (int c = 0; c < 3; ++c) n[c] += pressure;
-  // (e^z − 1)/C → q as C → 0
-  const T fung = value_of(stiffening) > 1e-12 ? expm1(z) / stiffening : q * (1.0 + 0.5 * z);
-  return mu * fung + 0.5 * bulk * jm1 * jm1;
+  return mu * q * relative_expm1(z) + 0.5 * bulk * jm1 * jm1;  // (e^z − 1)/C = q (e^z − 1)/z
 }
 
 /// Stored equilibrium energy by part: distortion (Fung), volume.

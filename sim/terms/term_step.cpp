@@ -6,6 +6,7 @@
 
 #include "sim/math/cubic.h"
 #include "sim/terms/element_loop.h"
+#include "sim/terms/kinematics.h"
 
 namespace rhytid {
 
@@ -51,19 +52,37 @@ void Term::hessian(const StepInfo& step, const TermStepData& data, const VectorX
     const std::size_t size = static_cast<std::size_t>(3 * g.num_nodes) * (3 * g.num_nodes),
                       n8 = g.padded_nodes;
     const std::size_t work_size = 6 * n8 * n8 + 7 * kHessianRows * n8;
-    constexpr int chunk = 16;  // elements computed in parallel before one thread adds them in order
-    std::vector<double> dense(size * chunk), work(work_size * chunk);
-    std::vector<char> present(chunk);
-    for (int first = 0; first < g.num_elements; first += chunk) {
-      const int count = std::min(chunk, g.num_elements - first);
-      for_elements(*this, gi, step, data, first, count, [&](const TermElement& e) {
-        const int k = e.index - first;
-        present[k] = kernels_->hessian(law_.get(), e.view, e.gather(u).data(),
-                                       data.prepared.data() + e.point * kernels_->np, projected,
-                                       work.data() + work_size * k, dense.data() + size * k);
+    // While elements of one chunk are computed, one thread adds those of the chunk before, in order.
+    constexpr int chunk = 32;
+    struct Chunk {
+      int first = 0, count = 0;
+      std::vector<double> dense;
+      std::vector<char> present;
+    } chunks[2];
+    for (Chunk& c : chunks) {
+      c.dense.resize(size * chunk);
+      c.present.resize(chunk);
+    }
+    const auto add = [&](Chunk& c) {
+      for (int k = 0; k < c.count; ++k)
+        if (c.present[k]) sink.add(g, c.first + k, c.dense.data() + size * k);
+    };
+    for (int first = 0, turn = 0; first < g.num_elements; first += chunk, turn = 1 - turn) {
+      Chunk &now = chunks[turn], &before = chunks[1 - turn];
+      now.first = first;
+      now.count = std::min(chunk, g.num_elements - first);
+      parallel_for_uneven(now.count + 1, [&](std::int64_t i) {
+        if (i == 0) return add(before);
+        const int k = static_cast<int>(i) - 1;
+        const TermElement e = term_element(*kernels_, g, first + k, step.dt(), data.theta[gi]);
+        thread_local std::vector<double> work;
+        if (work.size() < work_size) work.resize(work_size);
+        now.present[k] = kernels_->hessian(law_.get(), e.view, e.gather(u).data(),
+                                           data.prepared.data() + e.point * kernels_->np, projected,
+                                           work.data(), now.dense.data() + size * k);
       });
-      for (int k = 0; k < count; ++k)
-        if (present[k]) sink.add(g, first + k, dense.data() + size * k);
+      before.count = 0;
+      if (first + chunk >= g.num_elements) add(now);
     }
   }
 }

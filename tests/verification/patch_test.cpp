@@ -5,6 +5,7 @@
 
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
+#include "sim/terms/kinematics.h"
 #include "tests/support/small_scenes.h"
 #include "tests/verification/distorted_mesh.h"
 

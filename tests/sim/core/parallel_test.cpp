@@ -54,6 +54,25 @@ TEST_F(ParallelTest, RethrowsTheLowestFailureForAnyNumberOfThreads) {
   }
 }
 
+TEST_F(ParallelTest, UnevenWorkIsVisitedOnceAndFailsByTheLowestIndex) {
+  for (const int threads : {1, 2, 3}) {
+    set_num_threads(threads);
+    for (const int n : {0, 1, 5, 1000}) {
+      std::vector<int> visits(static_cast<std::size_t>(n), 0);
+      parallel_for_uneven(n, [&](std::int64_t i) { ++visits[static_cast<std::size_t>(i)]; });
+      EXPECT_EQ(visits, std::vector<int>(static_cast<std::size_t>(n), 1));
+    }
+    try {
+      parallel_for_uneven(50, [](std::int64_t i) {
+        if (i % 10 == 7) throw std::runtime_error("index " + std::to_string(i));
+      });
+      FAIL() << "no exception";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "index 7");
+    }
+  }
+}
+
 TEST_F(ParallelTest, NestedLoopsRun) {
   set_num_threads(2);
   std::vector<int> sums(8, 0);

@@ -1,10 +1,11 @@
-// A factorisation runs on the calling thread alone, and by OpenBLAS.
+// A factorisation runs on as many threads as asked for, with the same bits for any number, and by OpenBLAS.
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <ctime>
 #include <filesystem>
 #include <iterator>
+#include <random>
 #include <thread>
 #include <vector>
 
@@ -39,7 +40,69 @@ BlockPattern grid_pattern(int n, int width) {
   return BlockPattern(n * n, cliques);
 }
 
-TEST(SolveThreads, FactorisationStaysOnTheCallingThread) {
+class SolveThreads : public ::testing::Test {
+ protected:
+  void TearDown() override { set_num_threads(before_); }
+  int before_ = num_threads();
+};
+
+/// A positive definite matrix over a pattern, other numbers in every clique.
+BlockMatrix random_matrix(const BlockPattern& pattern) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  BlockMatrix matrix(pattern);
+  for (int c = 0; c < pattern.num_cliques(); ++c) {
+    const int m = 3 * static_cast<int>(pattern.clique(c).size());
+    const MatrixXd half = MatrixXd::NullaryExpr(m, m, [&] { return uniform(random); });
+    const MatrixXd dense = half * half.transpose() + 0.1 * MatrixXd::Identity(m, m);
+    matrix.add(c, dense.data());
+  }
+  return matrix;
+}
+
+TEST_F(SolveThreads, SameBitsForAnyNumberOfThreads) {
+  // A top supernode of several panels, and subtrees below it.
+  const BlockPattern pattern = grid_pattern(61, 5);
+  const BlockMatrix matrix = random_matrix(pattern);
+  const VectorXd rhs = VectorXd::LinSpaced(pattern.num_unknowns(), -1, 1);
+  std::vector<MatrixXd> solutions;
+  std::vector<double> pivots;
+  for (const int threads : {1, 2, 3, 5, 2}) {
+    set_num_threads(threads);
+    CholeskyFactor factor(pattern);
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      ASSERT_TRUE(factor.factorize(matrix));
+      solutions.push_back(factor.solve(rhs));
+      pivots.push_back(factor.smallest_pivot());
+    }
+  }
+  EXPECT_LE((matrix.multiply(solutions[0].col(0)) - rhs).norm(), 1e-10 * rhs.norm());
+  for (std::size_t k = 1; k < solutions.size(); ++k) {
+    EXPECT_TRUE(solutions[k] == solutions[0]) << k;
+    EXPECT_EQ(pivots[k], pivots[0]) << k;
+  }
+}
+
+TEST_F(SolveThreads, RefusesAndRecoversOnAnyNumberOfThreads) {
+  const BlockPattern pattern = grid_pattern(41, 5);
+  const BlockMatrix good = random_matrix(pattern);
+  for (const int threads : {1, 2, 4}) {
+    set_num_threads(threads);
+    CholeskyFactor factor(pattern);
+    for (const int unknown : {0, pattern.num_unknowns() / 2, pattern.num_unknowns() - 1}) {
+      // One negative diagonal entry, wherever it lies in the elimination order.
+      BlockMatrix bad = good;
+      bad.fix(unknown);
+      for (double& v : bad.values())
+        if (v == 1.0) v = -1;
+      EXPECT_FALSE(factor.factorize(bad)) << unknown;
+      EXPECT_FALSE(factor.usable());
+      EXPECT_TRUE(factor.factorize(good));
+    }
+  }
+}
+
+TEST_F(SolveThreads, FactorisationStaysOnTheCallingThread) {
   set_num_threads(1);
   const BlockPattern pattern = grid_pattern(61, 5);
   BlockMatrix matrix(pattern);

@@ -1,0 +1,244 @@
+#include "sim/solve/supernodal_cholesky.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "sim/core/parallel.h"
+
+extern "C" {
+void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
+            const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
+            const double* beta, double* c, const int* ldc);
+void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
+            const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
+            const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+}
+
+namespace rhytid {
+
+namespace {
+
+constexpr int kPanelWidth = 128;
+// Subtrees of at most this share of all floating-point operations are one piece of work.
+constexpr double kPieceShare = 1. / 64;
+// Updates of fewer columns are not worth the second call that leaves out their upper triangle.
+constexpr int kTriangleFrom = 32;
+
+}  // namespace
+
+/// What a thread needs for itself.
+struct SupernodalCholesky::Workspace {
+  std::vector<int> place;      ///< [size of the matrix] row → row of the panel's supernode
+  std::vector<int> target;     ///< the same for the rows of a source
+  std::vector<double> product;
+};
+
+/// Which panels are finished, and whether all went well so far.
+class SupernodalCholesky::Progress {
+ public:
+  explicit Progress(std::size_t panels) : done_(panels) {}
+  void wait_for(int panel) const { done_[static_cast<std::size_t>(panel)].wait(0, std::memory_order_acquire); }
+  void finish(int panel) {
+    done_[static_cast<std::size_t>(panel)].store(1, std::memory_order_release);
+    done_[static_cast<std::size_t>(panel)].notify_all();
+  }
+  int next_piece() { return next_.fetch_add(1, std::memory_order_relaxed); }
+  void fail() { failed_.store(true, std::memory_order_relaxed); }
+  bool failed() const { return failed_.load(std::memory_order_relaxed); }
+
+ private:
+  std::vector<std::atomic<int>> done_;
+  std::atomic<int> next_{0};
+  std::atomic<bool> failed_{false};
+};
+
+SupernodalCholesky::SupernodalCholesky(cholmod_factor& factor)
+    : factor_(&factor),
+      super_(static_cast<const int*>(factor.super)),
+      row_start_(static_cast<const int*>(factor.pi)),
+      value_start_(static_cast<const int*>(factor.px)),
+      rows_(static_cast<const int*>(factor.s)),
+      num_super_(static_cast<int>(factor.nsuper)) {
+  for (int s = 0; s < num_super_; ++s) {
+    first_panel_.push_back(static_cast<int>(panels_.size()));
+    for (int first = 0; first < width(s); first += kPanelWidth)
+      panels_.push_back({s, first, std::min(first + kPanelWidth, width(s)), 0, 0});
+    largest_height_ = std::max(largest_height_, height(s));
+  }
+  first_panel_.push_back(static_cast<int>(panels_.size()));
+  find_sources();
+  divide_work();
+}
+
+void SupernodalCholesky::find_sources() {
+  std::vector<int> super_of(factor_->n);
+  for (int s = 0; s < num_super_; ++s) std::fill(&super_of[super_[s]], &super_of[0] + super_[s + 1], s);
+  // Visits (panel, source) for all pairs, sources ascending.
+  const auto for_pairs = [&](auto&& visit) {
+    for (int d = 0; d < num_super_; ++d) {
+      const int* row = rows(d);
+      const int n = height(d);
+      for (int k = width(d), end = k; k < n; k = end) {
+        const int s = super_of[row[k]];
+        const int panel = first_panel_[s] + (row[k] - super_[s]) / kPanelWidth;
+        const int past = super_[s] + panels_[panel].last;
+        for (end = k; end < n && row[end] < past;) ++end;
+        visit(panel, Source{d, k, end});
+      }
+    }
+  };
+  for_pairs([&](int panel, const Source& source) {
+    ++panels_[panel].source_end;
+    product_size_ = std::max(product_size_, static_cast<std::size_t>(height(source.super) - source.row_begin) *
+                                                static_cast<std::size_t>(source.row_end - source.row_begin));
+  });
+  int total = 0;
+  for (Panel& panel : panels_) {
+    const int count = panel.source_end;
+    panel.source_begin = panel.source_end = total;
+    total += count;
+  }
+  sources_.resize(static_cast<std::size_t>(total));
+  for_pairs([&](int panel, const Source& source) { sources_[panels_[panel].source_end++] = source; });
+}
+
+void SupernodalCholesky::divide_work() {
+  // Work of a supernode where it is a source or itself, summed over its subtree; parents follow children.
+  std::vector<double> work(num_super_, 0.0);
+  std::vector<int> parent(num_super_, -1);
+  for (const Panel& panel : panels_)
+    for (int k = panel.source_begin; k < panel.source_end; ++k) {
+      const Source& source = sources_[k];
+      work[panel.super] += 2. * width(source.super) * (source.row_end - source.row_begin) *
+                           (height(source.super) - source.row_begin);
+      if (parent[source.super] < 0 || panel.super < parent[source.super]) parent[source.super] = panel.super;
+    }
+  double total = 0;
+  for (int s = 0; s < num_super_; ++s) {
+    work[s] += static_cast<double>(width(s)) * width(s) * height(s);
+    total += work[s];
+  }
+  for (int s = 0; s < num_super_; ++s)
+    if (parent[s] >= 0) work[parent[s]] += work[s];
+
+  // root[s]: the topmost supernode of the small subtree that s belongs to, -1 above them.
+  std::vector<int> root(num_super_, -1);
+  for (int s = num_super_ - 1; s >= 0; --s) {
+    if (work[s] > kPieceShare * total) continue;
+    root[s] = parent[s] >= 0 && root[parent[s]] >= 0 ? root[parent[s]] : s;
+  }
+  piece_start_ = {0};
+  const auto add = [&](int s) {
+    for (int panel = first_panel_[s]; panel < first_panel_[s + 1]; ++panel) piece_panels_.push_back(panel);
+  };
+  const auto close = [&] { piece_start_.push_back(static_cast<int>(piece_panels_.size())); };
+  std::vector<std::vector<int>> members(num_super_);
+  for (int s = 0; s < num_super_; ++s)
+    if (root[s] >= 0) members[root[s]].push_back(s);
+  for (int s = 0; s < num_super_; ++s) {
+    if (members[s].empty()) continue;
+    for (const int member : members[s]) add(member);
+    close();
+  }
+  for (int s = 0; s < num_super_; ++s) {
+    if (root[s] >= 0) continue;
+    for (int panel = first_panel_[s]; panel < first_panel_[s + 1]; ++panel) {
+      piece_panels_.push_back(panel);
+      close();
+    }
+  }
+}
+
+void SupernodalCholesky::assemble(const Panel& panel, const Matrix& a, Workspace& work) const {
+  const int s = panel.super, n = height(s);
+  double* const x = block(s);
+  const int* const row = rows(s);
+  for (int i = panel.first; i < n; ++i) work.place[row[i]] = i;
+  for (int c = panel.first; c < panel.last; ++c) {
+    double* const column = x + static_cast<std::ptrdiff_t>(c) * n;
+    std::fill(column + panel.first, column + n, 0.0);
+    const int j = super_[s] + c;
+    for (int e = a.column_start[j]; e < a.column_start[j + 1]; ++e) column[work.place[a.rows[e]]] = a.values[e];
+    column[c] += a.shift;
+  }
+}
+
+void SupernodalCholesky::subtract_source(const Panel& panel, const Source& source, Workspace& work) const {
+  const int d = source.super, k = width(d), ld = height(d);
+  const int columns = source.row_end - source.row_begin, rows_left = ld - source.row_begin;
+  const double* const from = block(d) + source.row_begin;
+  double* const product = work.product.data();
+  const double one = 1, zero = 0;
+  if (columns < kTriangleFrom) {
+    dgemm_("N", "T", &rows_left, &columns, &k, &one, from, &ld, from, &ld, &zero, product, &rows_left);
+  } else {
+    dsyrk_("L", "N", &columns, &k, &one, from, &ld, &zero, product, &rows_left);
+    const int below = rows_left - columns;
+    if (below > 0)
+      dgemm_("N", "T", &below, &columns, &k, &one, from + columns, &ld, from, &ld, &zero, product + columns,
+             &rows_left);
+  }
+  const int* const row = rows(d) + source.row_begin;
+  int* const target = work.target.data();
+  for (int i = 0; i < rows_left; ++i) target[i] = work.place[row[i]];
+  const int s = panel.super, n = height(s);
+  double* const x = block(s);
+  for (int j = 0; j < columns; ++j) {
+    double* const column = x + static_cast<std::ptrdiff_t>(target[j]) * n;
+    const double* const p = product + static_cast<std::ptrdiff_t>(j) * rows_left;
+    for (int i = j; i < rows_left; ++i) column[target[i]] -= p[i];
+  }
+}
+
+bool SupernodalCholesky::compute(int index, const Matrix& a, const Progress& progress, Workspace& work) const {
+  const Panel& panel = panels_[static_cast<std::size_t>(index)];
+  const int s = panel.super, n = height(s), columns = panel.last - panel.first;
+  assemble(panel, a, work);
+  for (int k = panel.source_begin; k < panel.source_end; ++k) {
+    progress.wait_for(first_panel_[sources_[k].super + 1] - 1);
+    if (progress.failed()) return false;
+    subtract_source(panel, sources_[k], work);
+  }
+  const auto at = [&](int i, int j) { return block(s) + static_cast<std::ptrdiff_t>(j) * n + i; };
+  const double one = 1, minus_one = -1;
+  const int rows_left = n - panel.first, below = n - panel.last;
+  for (int e = first_panel_[s]; e < index; ++e) {
+    const int first = panels_[static_cast<std::size_t>(e)].first, k = kPanelWidth;
+    progress.wait_for(e);
+    if (progress.failed()) return false;
+    dgemm_("N", "T", &rows_left, &columns, &k, &minus_one, at(panel.first, first), &n, at(panel.first, first),
+           &n, &one, at(panel.first, panel.first), &n);
+  }
+  int info = 0;
+  dpotrf_("L", &columns, at(panel.first, panel.first), &n, &info);
+  if (info != 0) return false;
+  if (below > 0)
+    dtrsm_("R", "L", "T", "N", &below, &columns, &one, at(panel.first, panel.first), &n,
+           at(panel.last, panel.first), &n);
+  return true;
+}
+
+bool SupernodalCholesky::factorize(const int* column_start, const int* rows, const double* values,
+                                   double shift) {
+  const Matrix a{column_start, rows, values, shift};
+  Progress progress(panels_.size());
+  const int pieces = static_cast<int>(piece_start_.size()) - 1;
+  parallel_for(num_threads(), [&](std::int64_t) {
+    Workspace work;
+    work.place.resize(factor_->n);
+    work.target.resize(static_cast<std::size_t>(largest_height_));
+    work.product.resize(product_size_);
+    for (int piece = progress.next_piece(); piece < pieces; piece = progress.next_piece())
+      for (int k = piece_start_[piece]; k < piece_start_[piece + 1]; ++k) {
+        const int panel = piece_panels_[k];
+        // After a failure the rest is passed over, but finished, so that nobody waits for it.
+        if (!progress.failed() && !compute(panel, a, progress, work)) progress.fail();
+        progress.finish(panel);
+      }
+  });
+  return !progress.failed();
+}
+
+}  // namespace rhytid

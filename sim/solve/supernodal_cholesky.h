@@ -1,0 +1,72 @@
+// The numbers of a supernodal Cholesky factor, computed on several threads with the same bits for any number
+// of them. CHOLMOD supplies the structure (supernodes, rows, storage) and solves with the result.
+//
+//   panel P of supernode s: columns J of L, rows i ≥ J
+//   L(i, P) = A(i, P) − Σ_d L(i, d) L(J, d)ᵀ − Σ_e L(i, e) L(J, e)ᵀ   d earlier supernodes, e earlier panels of s
+//   then    L(J, P) by dense Cholesky, the rows below by a triangular solve
+//
+// Left-looking by panels: what a panel is computed from, and in which order, is fixed by the structure; threads
+// only decide who computes it and when. Small subtrees of the elimination tree are one piece of work each, the
+// panels above them one by one in order, waiting for what they need.
+//
+// Internal to sim/solve.   Tests   tests/sim/solve/block_matrix_test.cpp, solve_threads_test.cpp
+#pragma once
+
+#include <cholmod.h>
+
+#include <memory>
+#include <vector>
+
+namespace rhytid {
+
+class SupernodalCholesky {
+ public:
+  /// `factor` is supernodal with values allocated (any), 32-bit indices; it must outlive this.
+  explicit SupernodalCholesky(cholmod_factor& factor);
+
+  /// Overwrites the factor's values with those of A + shift·I, A the lower triangle by columns in the factor's
+  /// order. False when a pivot is not positive (the values are then meaningless); a NaN may pass. Runs on
+  /// num_threads() threads, with a BLAS that must be on one thread.
+  [[nodiscard]] bool factorize(const int* column_start, const int* rows, const double* values, double shift);
+
+ private:
+  struct Panel {
+    int super, first, last;         ///< columns [first, last) of the supernode
+    int source_begin, source_end;  ///< into sources_
+  };
+  /// An earlier supernode whose rows [row_begin, row_end) (of its list) are columns of the panel.
+  struct Source {
+    int super, row_begin, row_end;
+  };
+  struct Workspace;
+  struct Matrix {
+    const int* column_start;
+    const int* rows;
+    const double* values;
+    double shift;
+  };
+  class Progress;
+
+  int width(int s) const { return super_[s + 1] - super_[s]; }
+  int height(int s) const { return row_start_[s + 1] - row_start_[s]; }
+  const int* rows(int s) const { return rows_ + row_start_[s]; }
+  double* block(int s) const { return static_cast<double*>(factor_->x) + value_start_[s]; }
+  void find_sources();
+  void divide_work();
+  bool compute(int panel, const Matrix& a, const Progress& progress, Workspace& work) const;
+  void assemble(const Panel& panel, const Matrix& a, Workspace& work) const;
+  void subtract_source(const Panel& panel, const Source& source, Workspace& work) const;
+
+  cholmod_factor* factor_;
+  const int *super_, *row_start_, *value_start_, *rows_;
+  int num_super_;
+  std::vector<Panel> panels_;        ///< by supernode and column
+  std::vector<int> first_panel_;     ///< [num_super + 1]
+  std::vector<Source> sources_;      ///< ascending by supernode within a panel
+  std::vector<int> piece_start_;     ///< [pieces + 1] into piece_panels_
+  std::vector<int> piece_panels_;    ///< pieces of work in the order in which they are begun
+  std::size_t product_size_ = 0;     ///< largest update of a source
+  int largest_height_ = 0;
+};
+
+}  // namespace rhytid
