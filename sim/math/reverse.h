@@ -241,7 +241,8 @@ void log_one_plus(const Reverse<V>* y, Reverse<V>* out) {
   s.compose(s.log_eigenvalue, value);
   for (int c = 0; c < 6; ++c) {
     const V a = s.log_eigenvalue[kSymRow[c]], b = s.log_eigenvalue[kSymCol[c]];
-    f[c] = map_lanes([](double x) { return std::exp(x); }, V(-0.5 * (a + b))) / packed_sinhc(V(0.5 * (a - b)));
+    f[c] =
+        map_lanes([](double x) { return std::exp(x); }, V(-0.5 * (a + b))) / packed_sinhc(V(0.5 * (a - b)));
   }
   s.frechet(f, partial);
   record_matrix_function<V>(y, nullptr, value, partial, out);

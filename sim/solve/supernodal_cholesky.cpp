@@ -30,8 +30,8 @@ constexpr int kTriangleFrom = 32;
 
 /// What a thread needs for itself.
 struct SupernodalCholesky::Workspace {
-  std::vector<int> place;      ///< [size of the matrix] row → row of the panel's supernode
-  std::vector<int> target;     ///< the same for the rows of a source
+  std::vector<int> place;   ///< [size of the matrix] row → row of the panel's supernode
+  std::vector<int> target;  ///< the same for the rows of a source
   std::vector<double> product;
 };
 
@@ -39,7 +39,9 @@ struct SupernodalCholesky::Workspace {
 class SupernodalCholesky::Progress {
  public:
   explicit Progress(std::size_t panels) : done_(panels) {}
-  void wait_for(int panel) const { done_[static_cast<std::size_t>(panel)].wait(0, std::memory_order_acquire); }
+  void wait_for(int panel) const {
+    done_[static_cast<std::size_t>(panel)].wait(0, std::memory_order_acquire);
+  }
   void finish(int panel) {
     done_[static_cast<std::size_t>(panel)].store(1, std::memory_order_release);
     done_[static_cast<std::size_t>(panel)].notify_all();
@@ -91,8 +93,9 @@ void SupernodalCholesky::find_sources() {
   };
   for_pairs([&](int panel, const Source& source) {
     ++panels_[panel].source_end;
-    product_size_ = std::max(product_size_, static_cast<std::size_t>(height(source.super) - source.row_begin) *
-                                                static_cast<std::size_t>(source.row_end - source.row_begin));
+    product_size_ =
+        std::max(product_size_, static_cast<std::size_t>(height(source.super) - source.row_begin) *
+                                    static_cast<std::size_t>(source.row_end - source.row_begin));
   });
   int total = 0;
   for (Panel& panel : panels_) {
@@ -160,7 +163,8 @@ void SupernodalCholesky::assemble(const Panel& panel, const Matrix& a, Workspace
     double* const column = x + static_cast<std::ptrdiff_t>(c) * n;
     std::fill(column + panel.first, column + n, 0.0);
     const int j = super_[s] + c;
-    for (int e = a.column_start[j]; e < a.column_start[j + 1]; ++e) column[work.place[a.rows[e]]] = a.values[e];
+    for (int e = a.column_start[j]; e < a.column_start[j + 1]; ++e)
+      column[work.place[a.rows[e]]] = a.values[e];
     column[c] += a.shift;
   }
 }
@@ -192,7 +196,8 @@ void SupernodalCholesky::subtract_source(const Panel& panel, const Source& sourc
   }
 }
 
-bool SupernodalCholesky::compute(int index, const Matrix& a, const Progress& progress, Workspace& work) const {
+bool SupernodalCholesky::compute(int index, const Matrix& a, const Progress& progress,
+                                 Workspace& work) const {
   const Panel& panel = panels_[static_cast<std::size_t>(index)];
   const int s = panel.super, n = height(s), columns = panel.last - panel.first;
   assemble(panel, a, work);

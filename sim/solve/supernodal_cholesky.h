@@ -31,7 +31,7 @@ class SupernodalCholesky {
 
  private:
   struct Panel {
-    int super, first, last;         ///< columns [first, last) of the supernode
+    int super, first, last;        ///< columns [first, last) of the supernode
     int source_begin, source_end;  ///< into sources_
   };
   /// An earlier supernode whose rows [row_begin, row_end) (of its list) are columns of the panel.
@@ -60,12 +60,12 @@ class SupernodalCholesky {
   cholmod_factor* factor_;
   const int *super_, *row_start_, *value_start_, *rows_;
   int num_super_;
-  std::vector<Panel> panels_;        ///< by supernode and column
-  std::vector<int> first_panel_;     ///< [num_super + 1]
-  std::vector<Source> sources_;      ///< ascending by supernode within a panel
-  std::vector<int> piece_start_;     ///< [pieces + 1] into piece_panels_
-  std::vector<int> piece_panels_;    ///< pieces of work in the order in which they are begun
-  std::size_t product_size_ = 0;     ///< largest update of a source
+  std::vector<Panel> panels_;      ///< by supernode and column
+  std::vector<int> first_panel_;   ///< [num_super + 1]
+  std::vector<Source> sources_;    ///< ascending by supernode within a panel
+  std::vector<int> piece_start_;   ///< [pieces + 1] into piece_panels_
+  std::vector<int> piece_panels_;  ///< pieces of work in the order in which they are begun
+  std::size_t product_size_ = 0;   ///< largest update of a source
   int largest_height_ = 0;
 };
 

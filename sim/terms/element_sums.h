@@ -60,6 +60,36 @@ void scatter(const ElementView& v, const double (*natural)[kMaxRows], double* f)
   }
 }
 
+/// For directions k … k + kLanes − 1 of kDirections at point q: local[a·R + r] = Σ_i du[i][a][k] table[q·R + r][i].
+template <int R>
+void gather_directions(const ElementView& v, const double* du, int q, int k, Lanes* local) {
+  for (int z = 0; z < 3 * R; ++z) local[z] = Lanes{};
+  for (int i = 0; i < v.num_nodes; ++i) {
+    Lanes node[3];
+    for (int a = 0; a < 3; ++a)
+      std::memcpy(&node[a], du + (3 * static_cast<std::size_t>(i) + a) * kDirections + k, sizeof(Lanes));
+    for (int r = 0; r < R; ++r) {
+      const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
+      for (int a = 0; a < 3; ++a) local[a * R + r] += t * node[a];
+    }
+  }
+}
+
+/// The transpose: adds to df[n][3][kDirections].
+template <int R>
+void scatter_directions(const ElementView& v, const Lanes* local, int q, int k, double* df) {
+  for (int i = 0; i < v.num_nodes; ++i) {
+    double* const at = df + 3 * static_cast<std::size_t>(i) * kDirections + k;
+    Lanes node[3];
+    for (int a = 0; a < 3; ++a) std::memcpy(&node[a], at + a * kDirections, sizeof(Lanes));
+    for (int r = 0; r < R; ++r) {
+      const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
+      for (int a = 0; a < 3; ++a) node[a] += t * local[a * R + r];
+    }
+    for (int a = 0; a < 3; ++a) std::memcpy(at + a * kDirections, &node[a], sizeof(Lanes));
+  }
+}
+
 /// Element matrix Σ_q Gᵀ A_q G from point blocks A_q [3R][3R] in natural directions, weight included. Points
 /// are collected until a pass of the dense product is worth while.
 template <int R>

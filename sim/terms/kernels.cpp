@@ -3,8 +3,8 @@
 #include <cstring>
 
 #include "sim/terms/contact_law.h"
-#include "sim/terms/make_kernel_table.h"
 #include "sim/terms/ligament_law.h"
+#include "sim/terms/make_kernel_table.h"
 
 namespace rhytid {
 

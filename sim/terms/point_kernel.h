@@ -308,16 +308,8 @@ struct PointKernel {
     double b[ne][nz];
     Kin::strain_gradient(z, b);
     for (int k = 0; k < kDirections; k += kLanes) {
-      Lanes local[nz] = {}, dz[nz];
-      for (int i = 0; i < v.num_nodes; ++i) {
-        Lanes node[3];
-        for (int a = 0; a < 3; ++a)
-          std::memcpy(&node[a], du + (3 * static_cast<std::size_t>(i) + a) * kDirections + k, sizeof(Lanes));
-        for (int r = 0; r < R; ++r) {
-          const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
-          for (int a = 0; a < 3; ++a) local[a * R + r] += t * node[a];
-        }
-      }
+      Lanes local[nz], dz[nz];
+      gather_directions<R>(v, du, q, k, local);
       Kin::to_point(local, jacobian, dz);
       for (int c = 0; c < ne; ++c) {
         Lanes sum = {};
@@ -366,16 +358,7 @@ struct PointKernel {
             for (int i = 0; i < nz; ++i) p[i] += b[c][i] * along;
           }
           Kin::from_point(p, jacobian, broadcast<Lanes>(v.weight[q]), local);
-          for (int i = 0; i < v.num_nodes; ++i) {
-            double* const at = df + 3 * static_cast<std::size_t>(i) * kDirections + k;
-            Lanes node[3];
-            for (int a = 0; a < 3; ++a) std::memcpy(&node[a], at + a * kDirections, sizeof(Lanes));
-            for (int r = 0; r < R; ++r) {
-              const double t = v.node_by_row[static_cast<std::size_t>(q * R + r) * v.padded_nodes + i];
-              for (int a = 0; a < 3; ++a) node[a] += t * local[a * R + r];
-            }
-            for (int a = 0; a < 3; ++a) std::memcpy(at + a * kDirections, &node[a], sizeof(Lanes));
-          }
+          scatter_directions<R>(v, local, q, k, df);
         }
       }
       if constexpr (ns > 0) {

@@ -98,7 +98,7 @@ struct ReverseKernel {
       V sum = {};
       for (int a = 0; a < 3; ++a) {
         const V fi = a == i ? h[3 * a + i] + 1.0 : h[3 * a + i],
-                    fj = a == j ? h[3 * a + j] + 1.0 : h[3 * a + j];
+                fj = a == j ? h[3 * a + j] + 1.0 : h[3 * a + j];
         sum += fi * dh[3 * a + j] + fj * dh[3 * a + i];
       }
       dy[c] = sum;

@@ -61,7 +61,7 @@ inline std::vector<std::string> without_effect(const Scene& scene) {
 /// The random direction is balanced, so that each parameter has a like share of its slope, except that none
 /// counts for less than `smallest_share` of the largest (where one's share would drown in rounding).
 inline void expect_right_gradient(const CertifiedCase& c, const Output& output,
-                                  const std::vector<VectorXd>& weights, double smallest_share = 0) {
+                                  const std::vector<VectorXd>& weights, double smallest_share = 1e-5) {
   ASSERT_TRUE(c.run.complete) << c.run.failure;
   const AdjointResult adjoint = adjoint_sweep(c.model(), c.scene_model.native(), c.run, output, weights);
   std::vector<std::string> addresses, without;

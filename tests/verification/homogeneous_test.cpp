@@ -5,6 +5,7 @@
 
 #include "loaded_problem.h"
 #include "sim/scene/names.h"
+#include "sim/terms/kinematics.h"
 #include "sim/terms/skin_law.h"
 
 namespace rhytid::test {

@@ -63,12 +63,13 @@ class Tables {
 class GradientBenchmark : public Benchmark {
  public:
   BenchmarkHelp help() const override {
-    return {"gradient", "time of an adjoint gradient and of a Jacobian beside the simulation",
-            "Simulates a drag over a patch of skin, or FILE, and differentiates it: one adjoint sweep (the "
-            "gradient of one functional by everything) and one tangent sweep (the Jacobian by the scene's "
-            "first parameters). Parts are timed in turn, medians are reported; 'forward' is the simulation at "
-            "the scene's own tolerance, 'tight' the polished one that is differentiated. Exit 3 when a run "
-            "does not reach its last frame. Writes gradient.csv and gradient.md into -o DIR."};
+    return {
+        "gradient", "time of an adjoint gradient and of a Jacobian beside the simulation",
+        "Simulates a drag over a patch of skin, or FILE, and differentiates it: one adjoint sweep (the "
+        "gradient of one functional by everything) and one tangent sweep (the Jacobian by the scene's "
+        "first parameters). Parts are timed in turn, medians are reported; 'forward' is the simulation at "
+        "the scene's own tolerance, 'tight' the polished one that is differentiated. Exit 3 when a run "
+        "does not reach its last frame. Writes gradient.csv and gradient.md into -o DIR."};
   }
   void add_options(CLI::App& app) override {
     scenes_.add_options(app);
@@ -98,10 +99,11 @@ class GradientBenchmark : public Benchmark {
     int part = 0;
     context.progress.stage(one.name + ", " + std::to_string(scene_model.model().num_nodes()) + " nodes",
                            4 * cost_.repeats);
-    const std::optional<GradientCost> cost = measure_gradient_cost(scene_model, cost_, [&](const std::string& begins) {
-      if (!begins.empty() && part++ > 0) context.progress.step_done(part - 1);
-      return !context.progress.interrupted();
-    });
+    const std::optional<GradientCost> cost =
+        measure_gradient_cost(scene_model, cost_, [&](const std::string& begins) {
+          if (!begins.empty() && part++ > 0) context.progress.step_done(part - 1);
+          return !context.progress.interrupted();
+        });
     context.progress.finish();
     if (!cost) return;
     tables.add(one.name, *cost);

@@ -64,8 +64,7 @@ std::optional<GradientCost> measure_gradient_cost(const SceneModel& scene_model,
     Trajectory run;
     forward.push_back(seconds_of([&] { run = simulate(model, native, own, observer); }));
     if (!go_on("")) return std::nullopt;
-    if (!run.complete)
-      throw adjoint::GradientError("the run did not reach its last frame: " + run.failure);
+    if (!run.complete) throw adjoint::GradientError("the run did not reach its last frame: " + run.failure);
     cost.steps = static_cast<int>(run.steps.size());
     cost.iterations = cost.factorisations = 0;
     for (const StepRecord& record : run.steps) {

@@ -14,20 +14,20 @@ namespace rhytid::tools {
 MatrixXd parameter_columns(const SceneModel& scene_model, int count);
 
 struct GradientCostOptions {
-  int repeats = 3;     ///< of every part, in turn; medians are reported
-  int parameters = 16; ///< columns of the Jacobian
-  int points = 200;    ///< outer points that the functional looks at
+  int repeats = 3;      ///< of every part, in turn; medians are reported
+  int parameters = 16;  ///< columns of the Jacobian
+  int points = 200;     ///< outer points that the functional looks at
 };
 
 /// Medians over the repeats, s unless said otherwise.
 struct GradientCost {
-  int nodes = 0, unknowns = 0, points = 0;  ///< points: quadrature points of all terms
+  int nodes = 0, unknowns = 0, points = 0;            ///< points: quadrature points of all terms
   int steps = 0, iterations = 0, factorisations = 0;  ///< of the run with the scene's own tolerance
-  int tight_iterations = 0;                 ///< of the run that is differentiated (tight, polished)
-  double forward = 0;                       ///< the scene's own tolerance
+  int tight_iterations = 0;                           ///< of the run that is differentiated (tight, polished)
+  double forward = 0;                                 ///< the scene's own tolerance
   double forward_tight = 0;
-  double adjoint = 0;                       ///< one functional, all native parameters
-  double jacobian = 0;                      ///< tangent sweep with `columns` parameters
+  double adjoint = 0;   ///< one functional, all native parameters
+  double jacobian = 0;  ///< tangent sweep with `columns` parameters
   int columns = 0;
   double duality = 0;  ///< |<J v, w> − <v, Jᵀ w>| relative: what was timed is right
 };

@@ -38,12 +38,13 @@ class PeakMemory {
 class MemoryBenchmark : public Benchmark {
  public:
   BenchmarkHelp help() const override {
-    return {"memory", "memory and time of a run and its adjoint, all states kept or within a budget",
-            "Simulates a drag over a patch of skin, or FILE, twice: keeping every state with its history, and "
-            "keeping displacements alone. Then differentiates the first, and the second within budgets that "
-            "hold 2, 10 and 30 states and without a limit; histories that were dropped are recomputed at "
-            "binomial distances. Reports peaks of resident memory, bytes of states, seconds, and whether the "
-            "gradients are the same bits. Writes memory.csv and memory.md into -o DIR."};
+    return {
+        "memory", "memory and time of a run and its adjoint, all states kept or within a budget",
+        "Simulates a drag over a patch of skin, or FILE, twice: keeping every state with its history, and "
+        "keeping displacements alone. Then differentiates the first, and the second within budgets that "
+        "hold 2, 10 and 30 states and without a limit; histories that were dropped are recomputed at "
+        "binomial distances. Reports peaks of resident memory, bytes of states, seconds, and whether the "
+        "gradients are the same bits. Writes memory.csv and memory.md into -o DIR."};
   }
   void add_options(CLI::App& app) override { scenes_.add_options(app); }
 
@@ -70,7 +71,9 @@ class MemoryBenchmark : public Benchmark {
         RunOptions options = scene_model.run_options();
         options.minimiser = adjoint::certificate_minimiser(options.minimiser);
         RunObserver observer;
-        observer.iteration = [&](int, double, int, double, double) { return !context.progress.interrupted(); };
+        observer.iteration = [&](int, double, int, double, double) {
+          return !context.progress.interrupted();
+        };
         observer.step = [&](const StepEvent& event) {
           if (event.frame_done && event.record.frame > 0) context.progress.step_done(event.record.frame);
         };
@@ -78,9 +81,8 @@ class MemoryBenchmark : public Benchmark {
         const auto add = [&](const Trajectory& run, const std::string& part, double seconds, double states,
                              long recomputed, const std::string& same) {
           const double peak = memory.peak();
-          csv.add_row({one.name, std::int64_t{model.num_nodes()},
-                       static_cast<std::int64_t>(run.steps.size()), part, seconds, states,
-                       std::int64_t{recomputed}, peak, same});
+          csv.add_row({one.name, std::int64_t{model.num_nodes()}, static_cast<std::int64_t>(run.steps.size()),
+                       part, seconds, states, std::int64_t{recomputed}, peak, same});
           char row[256];
           std::snprintf(row, sizeof row, "| %s | %d | %zu | %s | %.3g | %.4g | %ld | %.0f | %s |\n",
                         one.name.c_str(), model.num_nodes(), run.steps.size(), part.c_str(), seconds, states,
@@ -110,8 +112,8 @@ class MemoryBenchmark : public Benchmark {
           for (const int states : keep ? std::vector<int>{0} : std::vector<int>{0, 30, 10, 2}) {
             context.progress.stage("adjoint", 1);
             memory.reset();
-            const std::size_t budget =
-                states == 0 ? adjoint::ReverseStates::unlimited : state_bytes * static_cast<std::size_t>(states);
+            const std::size_t budget = states == 0 ? adjoint::ReverseStates::unlimited
+                                                   : state_bytes * static_cast<std::size_t>(states);
             const adjoint::AdjointResult result =
                 adjoint::adjoint_sweep_within(budget, model, native, run, *output, weights);
             context.progress.finish();

@@ -37,11 +37,12 @@ class Tables {
               {"share_of_read_bandwidth", ""}}) {}
 
   void add(const std::string& scene, const StageReport& report) {
-    markdown_ += "\n## " + scene + ": " + std::to_string(report.nodes) + " nodes, " +
-                 std::to_string(report.points) + " points, factor of " + rounded(report.factor_entries / 1e6) +
-                 " million entries and " + rounded(report.factor_flops / 1e9) +
-                 " GFLOP\n\n| stage | ms | ns per point | GFLOP/s | of FMA peak | GB/s | of read bandwidth |\n"
-                 "| --- | --- | --- | --- | --- | --- | --- |\n";
+    markdown_ +=
+        "\n## " + scene + ": " + std::to_string(report.nodes) + " nodes, " + std::to_string(report.points) +
+        " points, factor of " + rounded(report.factor_entries / 1e6) + " million entries and " +
+        rounded(report.factor_flops / 1e9) +
+        " GFLOP\n\n| stage | ms | ns per point | GFLOP/s | of FMA peak | GB/s | of read bandwidth |\n"
+        "| --- | --- | --- | --- | --- | --- | --- |\n";
     for (const StageTime& s : report.stages) {
       const double per_point = s.points > 0 ? s.seconds / s.points * 1e9 : 0;
       const double flops = s.flops / s.seconds, bytes = s.bytes / s.seconds;
@@ -59,8 +60,8 @@ class Tables {
   std::string markdown() const {
     return "# Stages of a step\n\nMedian time of one call with " + std::to_string(num_threads()) +
            " threads, at the end of a drag. One core of this machine: " + rounded(machine_.fma_flops / 1e9) +
-           " GFLOP/s of fused multiply-adds, reads " + rounded(machine_.read_bandwidth / 1e9) +
-           " GB/s.\n" + markdown_;
+           " GFLOP/s of fused multiply-adds, reads " + rounded(machine_.read_bandwidth / 1e9) + " GB/s.\n" +
+           markdown_;
   }
   void write(const std::string& folder) const {
     csv_.write(folder + "/stages.csv");

@@ -19,8 +19,8 @@ namespace {
 /// A run to some tolerance and what its derivatives say.
 struct Measured {
   Trajectory run;
-  double value = 0;   ///< of the functional
-  VectorXd gradient;  ///< by the parameters' coordinates
+  double value = 0;      ///< of the functional
+  VectorXd gradient;     ///< by the parameters' coordinates
   double predicted = 0;  ///< λᵀr: how far the functional is off, to first order
   long iterations = 0, factorisations = 0;
 };
@@ -67,11 +67,12 @@ class Sweep {
 class ToleranceBenchmark : public Benchmark {
  public:
   BenchmarkHelp help() const override {
-    return {"tolerance", "error of positions, of a functional and of its gradient against the solver's tolerance",
-            "Simulates a drag over a patch of skin, or FILE, to looser and tighter tolerances and compares with "
-            "a polished run: largest error of a position, error of a functional beside the estimate that the "
-            "adjoint gives of it without that run (sum of adjoint times residual), and error of the gradient by "
-            "all parameters. Writes tolerance.csv and tolerance.md into -o DIR."};
+    return {
+        "tolerance", "error of positions, of a functional and of its gradient against the solver's tolerance",
+        "Simulates a drag over a patch of skin, or FILE, to looser and tighter tolerances and compares with "
+        "a polished run: largest error of a position, error of a functional beside the estimate that the "
+        "adjoint gives of it without that run (sum of adjoint times residual), and error of the gradient by "
+        "all parameters. Writes tolerance.csv and tolerance.md into -o DIR."};
   }
   void add_options(CLI::App& app) override {
     scenes_.add_options(app);
@@ -114,10 +115,12 @@ class ToleranceBenchmark : public Benchmark {
           if (!m) return ExitCode::interrupted;
           double position = 0;
           if (m->run.steps.size() != reference->run.steps.size())
-            throw adjoint::GradientError("a run was bisected, so runs of different tolerances have other steps");
+            throw adjoint::GradientError(
+                "a run was bisected, so runs of different tolerances have other steps");
           for (std::size_t i = 0; i < m->run.steps.size(); ++i)
-            position = std::max(position, (m->run.steps[i].state.u - reference->run.steps[i].state.u)
-                                              .lpNorm<Eigen::Infinity>());
+            position = std::max(
+                position,
+                (m->run.steps[i].state.u - reference->run.steps[i].state.u).lpNorm<Eigen::Infinity>());
           const double functional = m->value - reference->value,
                        gradient = (m->gradient - reference->gradient).norm() / reference->gradient.norm();
           csv.add_row({one.name, std::int64_t{scene_model.model().num_nodes()}, tolerance,
