@@ -56,16 +56,19 @@ void BenchSceneOptions::add_options(CLI::App& app) {
       ->option_text("N")
       ->check(CLI::Range(1, 10000));
   app.add_option("--scene", file_, "a scene of yours instead of the patch")->option_text("FILE");
+  app.add_option("--set", settings_, "change one value of the scenes; may be repeated")
+      ->option_text("/POINTER=VALUE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 std::vector<BenchScene> BenchSceneOptions::load(VerbContext& context, const std::string& folder) const {
-  const std::vector<std::string>& settings = context.options.settings;
-  if (!file_.empty()) return {{file_, load_scene_argument(file_, settings, context.progress)}};
+  if (!file_.empty()) return {{file_, load_scene_argument(file_, settings_, context.progress)}};
   std::vector<BenchScene> scenes;
   for (const int nodes : nodes_) {
     const std::string name = "patch_" + std::to_string(nodes), text = drag_patch_scene(nodes, frames_);
     write_file(folder + "/" + name + ".json", text);
-    scenes.push_back({name, parse_scene_text(text, name, settings)});
+    scenes.push_back({name, parse_scene_text(text, name, settings_)});
   }
   return scenes;
 }

@@ -21,7 +21,7 @@ struct BenchScene {
   Scene scene;
 };
 
-/// Options --scene, --nodes and --frames, and the scenes that they name.
+/// Options --scene, --set, --nodes and --frames, and the scenes that they name.
 class BenchSceneOptions {
  public:
   explicit BenchSceneOptions(int frames) : frames_(frames) {}
@@ -34,6 +34,7 @@ class BenchSceneOptions {
   int frames_;
   std::vector<int> nodes_ = {2000, 8000};
   std::string file_;
+  std::vector<std::string> settings_;
 };
 
 }  // namespace rhytid::tools

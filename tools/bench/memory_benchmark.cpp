@@ -42,7 +42,7 @@ class MemoryBenchmark : public Benchmark {
         "memory", "memory and time of a run and its adjoint, all states kept or within a budget",
         "Simulates a drag over a patch of skin, or FILE, twice: keeping every state with its history, and "
         "keeping displacements alone. Then differentiates the first, and the second within budgets that "
-        "hold 2, 10 and 30 states and without a limit; histories that were dropped are recomputed at "
+        "hold 3, 10 and 30 states and without a limit; histories that were dropped are recomputed at "
         "binomial distances. Reports peaks of resident memory, bytes of states, seconds, and whether the "
         "gradients are the same bits. Writes memory.csv and memory.md into -o DIR."};
   }
@@ -105,11 +105,11 @@ class MemoryBenchmark : public Benchmark {
           for (const StepRecord& record : run.steps)
             bytes += 8. * static_cast<double>(record.state.u.size() + record.state.history.size() +
                                               record.state.velocity.size());
-          add(run, keep ? "run, all states" : "run, displacements alone", run.seconds, bytes / 1e6, 0, "");
+          add(run, keep ? "run: all states" : "run: displacements alone", run.seconds, bytes / 1e6, 0, "");
           const std::vector<VectorXd> weights = adjoint::random_weights(*output, run.frames(), 1);
           const auto state_bytes =
               static_cast<std::size_t>(8 * (6 * model.num_nodes() + static_cast<long>(model.history_size())));
-          for (const int states : keep ? std::vector<int>{0} : std::vector<int>{0, 30, 10, 2}) {
+          for (const int states : keep ? std::vector<int>{0} : std::vector<int>{0, 30, 10, 3}) {
             context.progress.stage("adjoint", 1);
             memory.reset();
             const std::size_t budget = states == 0 ? adjoint::ReverseStates::unlimited
@@ -122,9 +122,9 @@ class MemoryBenchmark : public Benchmark {
             const bool same = result.native_bar == first_gradient;
             if (!same) code = ExitCode::not_converged;
             add(run,
-                keep          ? "adjoint, all states"
-                : states == 0 ? "adjoint, all recomputed at once"
-                              : "adjoint, budget of " + std::to_string(states) + " states",
+                keep          ? "adjoint of all states"
+                : states == 0 ? "adjoint: all recomputed at once"
+                              : "adjoint: budget of " + std::to_string(states) + " states",
                 result.report.seconds, static_cast<double>(result.checkpoints.held_bytes) / 1e6,
                 result.checkpoints.recomputed_steps, same ? "yes" : "NO");
           }

@@ -1,0 +1,53 @@
+#!/bin/bash
+# rhytid bench on its smallest patch: tables with the figures that must hold on any machine, bad input refused.
+#   bench.sh PROGRAM
+set -u
+program=$1
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+failures=0
+fail() {
+  echo "FAILED: $*"
+  cat "$folder/out" "$folder/err"
+  failures=$((failures + 1))
+}
+# expect CODE ARGUMENTS...
+expect() {
+  local code=$1
+  shift
+  "$program" bench "$@" >"$folder/out" 2>"$folder/err"
+  local actual=$?
+  [ "$actual" = "$code" ] || fail "bench $*: exit $actual, expected $code"
+}
+# column FILE NAME: the values of a column of a CSV file without quoted cells.
+column() {
+  awk -F, -v name="$2" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i; next } { print $c }' "$1"
+}
+small=(--nodes 600 --frames 7)
+
+expect 0 stages "${small[@]}" --seconds 0 -o "$folder/stages"
+grep -q '^patch_600,.*,factorisation,' "$folder/stages/stages.csv" || fail "stages.csv has no factorisation"
+column "$folder/stages/stages.csv" time_ms | awk '!($1 > 0) { bad = 1 } END { exit bad || NR < 20 }' || fail "times of stages"
+[ -s "$folder/stages/patch_600.json" ] || fail "the patch is not kept"
+
+expect 0 gradient "${small[@]}" --repeats 1 --parameters 5 -o "$folder/gradient"
+[ "$(column "$folder/gradient/gradient.csv" columns)" = 5 ] || fail "columns of the Jacobian"
+column "$folder/gradient/gradient.csv" duality | awk '!($1 < 1e-11) { exit 1 }' || fail "duality"
+
+# Tighter is nearer, and the adjoint tells how far a loose run is off.
+expect 0 tolerance "${small[@]}" --tolerances 1e-2,1e-8 -o "$folder/tolerance"
+column "$folder/tolerance/tolerance.csv" gradient_error | awk 'NR == 1 { loose = $1 } NR == 2 { tight = $1 } END { exit !(tight < 1e-2 * loose) }' ||
+  fail "a tight tolerance has no better gradient"
+paste -d, <(column "$folder/tolerance/tolerance.csv" functional_error) <(column "$folder/tolerance/tolerance.csv" predicted_functional_error) |
+  awk -F, 'NR == 1 { d = $1 - $2; e = $1; if (d < 0) d = -d; if (e < 0) e = -e; exit !(d < 0.3 * e) }' || fail "the error bar"
+
+expect 0 memory "${small[@]}" -o "$folder/memory"
+[ "$(column "$folder/memory/memory.csv" same_bits | grep -c yes)" = 5 ] || fail "bits of gradients within budgets"
+
+# A scene of the user's, and what is refused.
+expect 0 gradient --scene "$folder/stages/patch_600.json" --set /time/frames=1 --repeats 1 --parameters 1 -o "$folder/own"
+expect 2 gradient --scene "$folder/none.json" -o "$folder/x"
+expect 2 stages --nodes 10 -o "$folder/x"
+expect 2 tolerance --tolerances 2 -o "$folder/x"
+expect 2 nonsense -o "$folder/x"
+exit "$failures"
