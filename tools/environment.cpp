@@ -16,6 +16,7 @@
 #include "sim/solve/blas_info.h"
 
 extern "C" int openblas_get_num_threads();
+extern "C" int openblas_get_parallel();
 
 namespace rhytid::tools {
 namespace {
@@ -88,7 +89,8 @@ std::vector<EnvironmentFact> simulator_environment(int threads) {
       {"vector instructions", vector_instructions()},
       {"threads", std::to_string(threads) + " in use, " + std::to_string(omp_get_num_procs()) +
                       " cores, OpenMP " + std::to_string(_OPENMP) + ", OpenBLAS " +
-                      std::to_string(openblas_get_num_threads())},
+                      std::to_string(openblas_get_num_threads()) +
+                      (openblas_get_parallel() == 0 ? " (sequential: factorisations use one thread)" : "")},
       {"dgemm_ is answered by", blas.name + ", " + blas.shared_object, blas_verdict},
       {"BLAS configuration", blas.config.empty() ? "unknown" : blas.config},
       {"BLAS and LAPACK loaded", join(loaded_blas_libraries(), " ")},

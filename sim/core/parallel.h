@@ -1,4 +1,4 @@
-// How many threads the simulator uses, and the one loop over them. Results never depend on the thread count:
+// How many threads the simulator uses, and the two loops over them. Results never depend on the thread count:
 // iteration i may write only to what belongs to i, and sums over i are done by the caller in index order.
 #pragma once
 

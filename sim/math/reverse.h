@@ -12,8 +12,8 @@
 #pragma once
 
 #include <cmath>
+#include <memory>
 #include <stdexcept>
-#include <vector>
 
 #include "sim/math/spectral3.h"
 
@@ -27,10 +27,13 @@ class ReverseTape {
   /// Outputs and inputs of a block at most.
   static constexpr int kBlockOutputs = 6, kBlockInputs = 7;
 
+  /// Records that one computation may have, and matrix functions among them.
+  static constexpr int kCapacity = 4096, kBlocks = 64;
+
   /// The calling thread's tape.
   static ReverseTape& mine() {
-    static thread_local ReverseTape tape;
-    return tape;
+    static thread_local const std::unique_ptr<ReverseTape> tape(new ReverseTape);
+    return *tape;
   }
   /// Forgets everything recorded.
   void begin() {
@@ -48,8 +51,8 @@ class ReverseTape {
   }
   /// Records outputs first … first + 5 with the derivatives partial[output][input]; returns `first`.
   int record_block(const int* inputs, int num_inputs, const V (*partial)[kBlockInputs]) {
-    if (num_blocks_ == static_cast<int>(blocks_.size())) blocks_.emplace_back();
-    Block& block = blocks_[static_cast<std::size_t>(num_blocks_)];
+    if (num_blocks_ == kBlocks) throw std::length_error("ReverseTape: too many matrix functions");
+    Block& block = blocks_[num_blocks_];
     block.num_inputs = num_inputs;
     for (int i = 0; i < num_inputs; ++i) block.inputs[i] = inputs[i];
     for (int o = 0; o < kBlockOutputs; ++o)
@@ -69,7 +72,7 @@ class ReverseTape {
     for (int k = count_ - 1; k > 0; --k) {
       const int a = parent_[2 * k], b = parent_[2 * k + 1];
       if (a < 0) {
-        const Block& block = blocks_[static_cast<std::size_t>(b)];
+        const Block& block = blocks_[b];
         for (int i = 0; i < block.num_inputs; ++i) {
           V sum = bar_[block.inputs[i]];
           for (int o = 0; o < kBlockOutputs; ++o) sum += bar_[k + o] * block.partial[o][i];
@@ -84,15 +87,16 @@ class ReverseTape {
   }
 
  private:
-  static constexpr int kCapacity = 4096;
   struct Block {
     int num_inputs, inputs[kBlockInputs];
     V partial[kBlockOutputs][kBlockInputs];
   };
-  ReverseTape() : partial_(2 * kCapacity), bar_(kCapacity), parent_(2 * kCapacity) {}
-  std::vector<V> partial_, bar_;
-  std::vector<int> parent_;
-  std::vector<Block> blocks_;
+  ReverseTape() = default;
+  // Arrays, not vectors: what the standard library compiles for a vector of numbers carries no instruction set in
+  // its name (isa.h).
+  V partial_[2 * kCapacity], bar_[kCapacity];
+  int parent_[2 * kCapacity];
+  Block blocks_[kBlocks];
   int count_ = 1, num_blocks_ = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "sim/core/error.h"
+#include "sim/core/parallel.h"
 #include "sim/solve/block_matrix.h"
 #include "sim/solve/block_pattern_impl.h"
 #include "sim/solve/cholmod_session.h"
@@ -13,12 +14,15 @@ namespace rhytid {
 
 struct CholeskyFactor::Impl {
   explicit Impl(const BlockPattern& p);
-  ~Impl() { cholmod_free_factor(&factor, &session); }
 
+  struct Release {
+    cholmod_common* common;
+    void operator()(cholmod_factor* factor) const { cholmod_free_factor(&factor, common); }
+  };
   const BlockPattern* pattern;
   // CHOLMOD writes its workspace and status into the session even when it only solves.
   mutable CholmodSession session;
-  cholmod_factor* factor = nullptr;
+  std::unique_ptr<cholmod_factor, Release> factor{nullptr, {&session}};
   std::optional<SupernodalCholesky> numbers;
   bool usable = false;
   double smallest_pivot = 0, largest_pivot = 0, flops = 0;
@@ -38,11 +42,11 @@ CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
       lower_pattern(static_cast<std::size_t>(p.num_unknowns()), static_cast<std::size_t>(p.num_entries()),
                     impl.scalar_column_start.data(), impl.scalar_rows.data());
   const SingleThreadScope single_thread;
-  factor = cholmod_analyze(&matrix, &session);
+  factor.reset(cholmod_analyze(&matrix, &session));
   if (!factor) throw_on_cholmod_error(*&session);
   flops = session->fl;
   cholmod_change_factor(CHOLMOD_REAL, /*to_ll=*/1, /*to_super=*/1, /*to_packed=*/1, /*to_monotonic=*/1,
-                        factor, &session);
+                        factor.get(), &session);
   throw_on_cholmod_error(*&session);
   numbers.emplace(*factor);
 }
@@ -79,9 +83,11 @@ bool CholeskyFactor::factorize(const BlockMatrix& matrix, double shift) {
   impl.usable = false;
   impl.smallest_pivot = impl.largest_pivot = 0;
   const BlockPattern::Impl& p = impl.pattern->impl();
+  // Before the scope: an OpenBLAS over OpenMP makes its one thread the default of OpenMP.
+  const int threads = blas_is_reentrant() ? num_threads() : 1;
   const SingleThreadBlas blas;
   if (impl.numbers->factorize(p.scalar_column_start.data(), p.scalar_rows.data(), matrix.values().data(),
-                              shift))
+                              shift, threads))
     impl.measure_pivots();
   return impl.usable;
 }
@@ -112,7 +118,7 @@ MatrixXd CholeskyFactor::solve(const MatrixXd& rhs) const {
   impl.session->status = CHOLMOD_OK;
   const auto release = [&](cholmod_dense* x) { cholmod_free_dense(&x, &impl.session); };
   const std::unique_ptr<cholmod_dense, decltype(release)> solution(
-      cholmod_solve(CHOLMOD_LDLt, impl.factor, &view, &impl.session), release);
+      cholmod_solve(CHOLMOD_LDLt, impl.factor.get(), &view, &impl.session), release);
   throw_on_cholmod_error(*&impl.session);
 
   const Eigen::Map<const MatrixXd> x(static_cast<const double*>(solution->x), rhs.rows(), rhs.cols());

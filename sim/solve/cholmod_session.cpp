@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include <mutex>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -9,16 +10,33 @@
 extern "C" {
 void openblas_set_num_threads(int count);
 int openblas_get_num_threads(void);
+int openblas_get_parallel(void);  // 0 sequential, 1 own threads, 2 OpenMP
 }
 
 namespace rhytid {
 
-SingleThreadBlas::SingleThreadBlas() : blas_threads_(openblas_get_num_threads()) {
-  if (blas_threads_ != 1) openblas_set_num_threads(1);
+namespace {
+
+// The number of OpenBLAS's threads belongs to the process.
+std::mutex blas_mutex;
+int blas_scopes = 0, blas_threads_before = 1;
+
+}  // namespace
+
+bool blas_is_reentrant() {
+  return openblas_get_parallel() != 0;
+}
+
+SingleThreadBlas::SingleThreadBlas() {
+  const std::lock_guard lock(blas_mutex);
+  if (blas_scopes++ > 0) return;
+  blas_threads_before = openblas_get_num_threads();
+  if (blas_threads_before != 1) openblas_set_num_threads(1);
 }
 
 SingleThreadBlas::~SingleThreadBlas() {
-  if (blas_threads_ != 1) openblas_set_num_threads(blas_threads_);
+  const std::lock_guard lock(blas_mutex);
+  if (--blas_scopes == 0 && blas_threads_before != 1) openblas_set_num_threads(blas_threads_before);
 }
 
 SingleThreadScope::SingleThreadScope() : active_levels_(omp_get_max_active_levels()) {

@@ -27,16 +27,18 @@ class CholmodSession {
   cholmod_common common_;
 };
 
-/// While alive, OpenBLAS runs every call on the thread that makes it.
+/// Whether several threads may call OpenBLAS at once: builds with threads of any kind lock what they share, the
+/// sequential build does not.
+bool blas_is_reentrant();
+
+/// While one is alive anywhere in the process, OpenBLAS runs every call on the thread that makes it; the last to
+/// go sets back what the first found.
 class SingleThreadBlas {
  public:
   SingleThreadBlas();
   ~SingleThreadBlas();
   SingleThreadBlas(const SingleThreadBlas&) = delete;
   SingleThreadBlas& operator=(const SingleThreadBlas&) = delete;
-
- private:
-  int blas_threads_;
 };
 
 /// While alive, this thread's calls into CHOLMOD and OpenBLAS run on this thread alone. CHOLMOD 3's OpenMP

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 
 #include "sim/core/parallel.h"
 
@@ -43,7 +44,9 @@ class SupernodalCholesky::Progress {
     done_[static_cast<std::size_t>(panel)].wait(0, std::memory_order_acquire);
   }
   void finish(int panel) {
-    done_[static_cast<std::size_t>(panel)].store(1, std::memory_order_release);
+    // Sequentially consistent, not only a release: notify_all() wakes nobody when it reads that nobody waits, and
+    // that read must not come before the store.
+    done_[static_cast<std::size_t>(panel)].store(1, std::memory_order_seq_cst);
     done_[static_cast<std::size_t>(panel)].notify_all();
   }
   int next_piece() { return next_.fetch_add(1, std::memory_order_relaxed); }
@@ -226,22 +229,31 @@ bool SupernodalCholesky::compute(int index, const Matrix& a, const Progress& pro
 }
 
 bool SupernodalCholesky::factorize(const int* column_start, const int* rows, const double* values,
-                                   double shift) {
+                                   double shift, int threads) {
   const Matrix a{column_start, rows, values, shift};
   Progress progress(panels_.size());
   const int pieces = static_cast<int>(piece_start_.size()) - 1;
-  parallel_for(num_threads(), [&](std::int64_t) {
+  parallel_for(threads, [&](std::int64_t) {
     Workspace work;
-    work.place.resize(factor_->n);
-    work.target.resize(static_cast<std::size_t>(largest_height_));
-    work.product.resize(product_size_);
+    std::exception_ptr failure;
     for (int piece = progress.next_piece(); piece < pieces; piece = progress.next_piece())
       for (int k = piece_start_[piece]; k < piece_start_[piece + 1]; ++k) {
         const int panel = piece_panels_[k];
-        // After a failure the rest is passed over, but finished, so that nobody waits for it.
-        if (!progress.failed() && !compute(panel, a, progress, work)) progress.fail();
+        // Whatever happens, a panel that was taken is finished, or those that wait for it would do so for ever.
+        try {
+          if (work.place.empty()) {
+            work.place.resize(factor_->n);
+            work.target.resize(static_cast<std::size_t>(largest_height_));
+            work.product.resize(product_size_);
+          }
+          if (!progress.failed() && !compute(panel, a, progress, work)) progress.fail();
+        } catch (...) {
+          failure = std::current_exception();
+          progress.fail();
+        }
         progress.finish(panel);
       }
+    if (failure) std::rethrow_exception(failure);
   });
   return !progress.failed();
 }

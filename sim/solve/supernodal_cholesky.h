@@ -25,9 +25,10 @@ class SupernodalCholesky {
   explicit SupernodalCholesky(cholmod_factor& factor);
 
   /// Overwrites the factor's values with those of A + shift·I, A the lower triangle by columns in the factor's
-  /// order. False when a pivot is not positive (the values are then meaningless); a NaN may pass. Runs on
-  /// num_threads() threads, with a BLAS that must be on one thread.
-  [[nodiscard]] bool factorize(const int* column_start, const int* rows, const double* values, double shift);
+  /// order. False when a pivot is not positive (the values are then meaningless); a NaN may pass. The BLAS must
+  /// be on one thread per call, and, with several `threads`, safe to call from several at once.
+  [[nodiscard]] bool factorize(const int* column_start, const int* rows, const double* values, double shift,
+                               int threads);
 
  private:
   struct Panel {

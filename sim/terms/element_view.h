@@ -8,7 +8,7 @@ inline constexpr int kDirections = 8;
 /// Rows of the table that one Hessian pass treats; a multiple of R.
 inline constexpr int kHessianRows = 24;
 
-/// Everything an element kernel reads, as plain pointers (see the shapes above; null where a law has none).
+/// Everything an element kernel reads, as plain pointers (null where a law has none).
 struct ElementView {
   int num_nodes, padded_nodes;     ///< n, npad (multiple of 8)
   int num_points;                  ///< nq

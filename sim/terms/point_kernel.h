@@ -3,7 +3,8 @@
 //   energy       W = Σ_q w_q ψ(e_q)                       e = Y(∇u) on prisms, e = u on surfaces
 //   gradient     ∂W/∂u = Σ_q w_q Zᵀ (∂e/∂z)ᵀ σ            z = ∇u or u, linear in the nodal values: z = Z u
 //   Hessian      Zᵀ [ (∂e/∂z)ᵀ (∂σ/∂e) (∂e/∂z) + σ·∂²e/∂z² ] Z
-//   cross blocks derivatives of σ and of the history update by old state and parameters, with dual numbers
+//   cross blocks derivatives of σ and of the history update by old state and parameters, with dual numbers;
+//                their transposes on prisms by reverse-mode numbers (reverse_kernel.h)
 //
 // A law supplies prepare, stress and update, templated on the scalar (skin_law.h is the richest example);
 // everything else, tangent and adjoint blocks included, is here and knows no physics. Eigen-free: the prism

@@ -119,7 +119,7 @@ class Term {
   class MatrixSink {
    public:
     virtual ~MatrixSink() = default;
-    /// dense is [3n][3n], node-major; called in a fixed order from one thread.
+    /// dense is [3n][3n], node-major; called in a fixed order, one at a time, by any thread.
     virtual void add(const TermGroup& group, int element, double* dense) = 0;
   };
   void hessian(const StepInfo& step, const TermStepData& data, const VectorXd& u, bool projected,

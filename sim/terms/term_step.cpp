@@ -53,15 +53,15 @@ void Term::hessian(const StepInfo& step, const TermStepData& data, const VectorX
                       n8 = g.padded_nodes;
     const std::size_t work_size = 6 * n8 * n8 + 7 * kHessianRows * n8;
     // While elements of one chunk are computed, one thread adds those of the chunk before, in order.
-    constexpr int chunk = 32;
+    const int chunk = std::min(32, g.num_elements);
     struct Chunk {
       int first = 0, count = 0;
       std::vector<double> dense;
       std::vector<char> present;
     } chunks[2];
-    for (Chunk& c : chunks) {
-      c.dense.resize(size * chunk);
-      c.present.resize(chunk);
+    for (int turn = 0; turn < (g.num_elements > chunk ? 2 : 1); ++turn) {
+      chunks[turn].dense.resize(size * chunk);
+      chunks[turn].present.resize(static_cast<std::size_t>(chunk));
     }
     const auto add = [&](Chunk& c) {
       for (int k = 0; k < c.count; ++k)

@@ -7,6 +7,7 @@
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
 #include "tools/scene_argument.h"
+#include "tools/study/study_run.h"
 
 namespace rhytid::tools {
 
@@ -63,12 +64,17 @@ void BenchSceneOptions::add_options(CLI::App& app) {
 }
 
 std::vector<BenchScene> BenchSceneOptions::load(VerbContext& context, const std::string& folder) const {
-  if (!file_.empty()) return {{file_, load_scene_argument(file_, settings_, context.progress)}};
   std::vector<BenchScene> scenes;
+  if (!file_.empty()) {
+    scenes.push_back({file_, load_scene_argument(file_, settings_, context.progress)});
+    require_frames(scenes.front().scene, file_);
+    return scenes;
+  }
   for (const int nodes : nodes_) {
     const std::string name = "patch_" + std::to_string(nodes), text = drag_patch_scene(nodes, frames_);
     write_file(folder + "/" + name + ".json", text);
     scenes.push_back({name, parse_scene_text(text, name, settings_)});
+    require_frames(scenes.back().scene, name);
   }
   return scenes;
 }

@@ -37,11 +37,11 @@ class Tables {
                   std::int64_t{c.steps}, std::int64_t{c.iterations}, std::int64_t{c.factorisations},
                   std::int64_t{c.tight_iterations}, std::int64_t{c.columns}, c.forward, c.forward_tight,
                   c.adjoint, c.jacobian, c.adjoint / c.forward, c.jacobian / c.forward, c.duality});
-    char row[256];
-    std::snprintf(row, sizeof row, "| %s | %d | %d | %d | %.3g | %.3g | %.3g | %.3g | %.3f | %.3f | %.1e |\n",
-                  scene.c_str(), c.nodes, c.steps, c.iterations, c.forward, c.forward_tight, c.adjoint,
-                  c.jacobian, c.adjoint / c.forward, c.jacobian / c.forward, c.duality);
-    markdown_ += row;
+    char row[200];
+    std::snprintf(row, sizeof row, " | %d | %d | %d | %.3g | %.3g | %.3g | %.3g | %.3f | %.3f | %.1e |\n",
+                  c.nodes, c.steps, c.iterations, c.forward, c.forward_tight, c.adjoint, c.jacobian,
+                  c.adjoint / c.forward, c.jacobian / c.forward, c.duality);
+    markdown_ += "| " + scene + row;
   }
 
   std::string markdown() const {

@@ -1,39 +1,18 @@
 #include "tools/bench/memory_benchmark.h"
 
-#include <malloc.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <fstream>
-#include <sstream>
 
 #include "adjoint/certificate.h"
 #include "sim/output/atomic_file.h"
 #include "sim/output/csv.h"
 #include "tools/bench/bench_scenes.h"
+#include "tools/peak_memory.h"
 
 namespace rhytid::tools {
 namespace {
-
-/// A line of /proc/self/status in MB, 0 where there is none.
-double status_megabytes(const char* key) {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.rfind(key, 0) == 0) return std::stod(line.substr(line.find(':') + 1)) / 1024;
-  return 0;
-}
-
-/// Most memory that the process had resident since reset(), MB.
-class PeakMemory {
- public:
-  void reset() {
-    malloc_trim(0);
-    std::ofstream("/proc/self/clear_refs") << "5";
-  }
-  double peak() const { return status_megabytes("VmHWM:"); }
-};
 
 class MemoryBenchmark : public Benchmark {
  public:
@@ -77,17 +56,16 @@ class MemoryBenchmark : public Benchmark {
         observer.step = [&](const StepEvent& event) {
           if (event.frame_done && event.record.frame > 0) context.progress.step_done(event.record.frame);
         };
-        PeakMemory memory;
         const auto add = [&](const Trajectory& run, const std::string& part, double seconds, double states,
                              long recomputed, const std::string& same) {
-          const double peak = memory.peak();
+          const double peak = take_peak_memory().value_or(0);
           csv.add_row({one.name, std::int64_t{model.num_nodes()}, static_cast<std::int64_t>(run.steps.size()),
                        part, seconds, states, std::int64_t{recomputed}, peak, same});
-          char row[256];
-          std::snprintf(row, sizeof row, "| %s | %d | %zu | %s | %.3g | %.4g | %ld | %.0f | %s |\n",
-                        one.name.c_str(), model.num_nodes(), run.steps.size(), part.c_str(), seconds, states,
-                        recomputed, peak, same.c_str());
-          markdown += row;
+          char row[200];
+          std::snprintf(row, sizeof row, " | %d | %zu | %s | %.3g | %.4g | %ld | %.0f | %s |\n",
+                        model.num_nodes(), run.steps.size(), part.c_str(), seconds, states, recomputed, peak,
+                        same.c_str());
+          markdown += "| " + one.name + row;
           csv.write(folder + "/memory.csv");
           write_file(folder + "/memory.md", markdown);
         };
@@ -95,7 +73,7 @@ class MemoryBenchmark : public Benchmark {
         for (const bool keep : {true, false}) {
           options.keep_histories = keep;
           context.progress.stage(one.name + (keep ? ", all states" : ", displacements"), options.frames);
-          memory.reset();
+          (void)take_peak_memory();
           const Trajectory run = simulate(model, native, options, observer);
           context.progress.finish();
           if (context.progress.interrupted()) return ExitCode::interrupted;
@@ -108,10 +86,10 @@ class MemoryBenchmark : public Benchmark {
           add(run, keep ? "run: all states" : "run: displacements alone", run.seconds, bytes / 1e6, 0, "");
           const std::vector<VectorXd> weights = adjoint::random_weights(*output, run.frames(), 1);
           const auto state_bytes =
-              static_cast<std::size_t>(8 * (6 * model.num_nodes() + static_cast<long>(model.history_size())));
+              static_cast<std::size_t>(8 * (3 * model.num_nodes() + static_cast<long>(model.history_size())));
           for (const int states : keep ? std::vector<int>{0} : std::vector<int>{0, 30, 10, 3}) {
             context.progress.stage("adjoint", 1);
-            memory.reset();
+            (void)take_peak_memory();
             const std::size_t budget = states == 0 ? adjoint::ReverseStates::unlimited
                                                    : state_bytes * static_cast<std::size_t>(states);
             const adjoint::AdjointResult result =

@@ -15,8 +15,8 @@ struct StageTime {
   std::string name;
   double seconds = 0;
   double points = 0;  ///< quadrature points; 0 for a stage that has none
-  double flops = 0;   ///< floating-point operations; 0 when not counted
-  double bytes = 0;   ///< read at least; 0 when not counted
+  double flops = 0;   ///< floating-point operations, on all threads; 0 when not counted
+  double bytes = 0;   ///< read at least, by one thread; 0 when not counted
 };
 
 /// What this machine can do on one core, measured now.
@@ -32,8 +32,8 @@ struct StageReport {
   std::vector<StageTime> stages;
 };
 
-/// Runs `scene_model` to its last frame but one and times every stage of the step after it: calls repeated for
-/// at least `seconds` each. Throws adjoint::GradientError when the run does not get there or the step cannot be
+/// Runs `scene_model`, which has a frame at least, and times every stage of its last step over again: calls
+/// repeated for at least `seconds` each. Throws adjoint::GradientError when the run does not get there or the step cannot be
 /// differentiated; nothing when `go_on` said false.
 std::optional<StageReport> measure_stages(const SceneModel& scene_model, double seconds,
                                           const std::function<bool()>& go_on = {});

@@ -46,7 +46,7 @@ class Tables {
     for (const StageTime& s : report.stages) {
       const double per_point = s.points > 0 ? s.seconds / s.points * 1e9 : 0;
       const double flops = s.flops / s.seconds, bytes = s.bytes / s.seconds;
-      const double fma = machine_.fma_flops > 0 ? flops / machine_.fma_flops : 0;
+      const double fma = machine_.fma_flops > 0 ? flops / (machine_.fma_flops * num_threads()) : 0;
       const double read = bytes / machine_.read_bandwidth;
       csv_.add_row({scene, std::int64_t{report.nodes}, std::int64_t{report.unknowns},
                     std::int64_t{num_threads()}, s.name, s.seconds * 1e3, s.points, per_point, s.flops, fma,
@@ -60,7 +60,9 @@ class Tables {
   std::string markdown() const {
     return "# Stages of a step\n\nMedian time of one call with " + std::to_string(num_threads()) +
            " threads, at the end of a drag. One core of this machine: " + rounded(machine_.fma_flops / 1e9) +
-           " GFLOP/s of fused multiply-adds, reads " + rounded(machine_.read_bandwidth / 1e9) + " GB/s.\n" +
+           " GFLOP/s of fused multiply-adds, reads " + rounded(machine_.read_bandwidth / 1e9) +
+           " GB/s. Shares of the FMA peak are of that of all threads; of the read bandwidth, of one "
+           "core's.\n" +
            markdown_;
   }
   void write(const std::string& folder) const {

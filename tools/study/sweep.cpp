@@ -1,11 +1,8 @@
 #include "tools/study/sweep.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <ostream>
 
@@ -14,6 +11,7 @@
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
 #include "tools/forward_run.h"
+#include "tools/peak_memory.h"
 #include "tools/study/parameter_sets.h"
 #include "tools/study/study_run.h"
 #include "tools/study/sweep_report.h"
@@ -29,20 +27,6 @@ constexpr double kBetweenTables = 20;
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-/// The largest resident memory since the last call, MB; 0 where the system does not tell. What other variants
-/// have left to the allocator goes back first, so that it does not count for the next.
-double take_peak_memory() {
-#ifdef __GLIBC__
-  malloc_trim(0);
-#endif
-  double peak = 0;
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmHWM:")) peak = std::strtod(line.c_str() + 6, nullptr) / 1024;
-  std::ofstream("/proc/self/clear_refs") << "5";
-  return peak;
 }
 
 class Sweep {
@@ -69,7 +53,13 @@ class Sweep {
     ExitCode worst = ExitCode::ok;
     for (const Variant& v : experiment_.variants) {
       if (!is_wanted(v)) continue;
-      const ExitCode code = run(v);
+      ExitCode code = ExitCode::ok;
+      try {
+        code = run(v);
+      } catch (...) {
+        report();  // with what the variants before it left
+        throw;
+      }
       if (code == ExitCode::interrupted) {
         report();
         return code;
@@ -151,12 +141,12 @@ class Sweep {
     // Until its checkpoint is gone, what lies there is that of another variant, to which a kill must not lead
     // back.
     if (!is_same) write_variant(own.output, {v.name, {}, "running", "", {}});
-    take_peak_memory();
+    (void)take_peak_memory();
     WrinkleRecorder recorder(experiment_.measure, [&] { write_variant(own.output, result); });
     const ExitCode code = run_forward(context, options_.frames, is_same, &recorder);
     if (code == ExitCode::interrupted) return code;
     result.columns = read_results(own.output);
-    result.columns.push_back({"peak_memory", "MB", take_peak_memory()});
+    result.columns.push_back({"peak_memory", "MB", take_peak_memory().value_or(0)});
     result.status = code == ExitCode::ok ? "complete" : "not_converged";
     const auto record = nlohmann::json::parse(read_file(own.output + "/run.json"));
     result.reason = record["exit"]["reason"];

@@ -5,6 +5,8 @@
 #include <ctime>
 #include <filesystem>
 #include <iterator>
+#include <limits>
+#include <numeric>
 #include <random>
 #include <thread>
 #include <vector>
@@ -99,6 +101,36 @@ TEST_F(SolveThreads, RefusesAndRecoversOnAnyNumberOfThreads) {
       EXPECT_FALSE(factor.usable());
       EXPECT_TRUE(factor.factorize(good));
     }
+  }
+}
+
+/// One supernode of several panels: 450 unknowns that all couple.
+TEST_F(SolveThreads, WideSupernodesAndNestedLoops) {
+  std::vector<int> all(150);
+  std::iota(all.begin(), all.end(), 0);
+  const BlockPattern pattern(150, {all});
+  const BlockMatrix good = random_matrix(pattern);
+  const VectorXd rhs = VectorXd::LinSpaced(pattern.num_unknowns(), -1, 1);
+  MatrixXd expected;
+  for (const int threads : {1, 2, 3, 7}) {
+    set_num_threads(threads);
+    CholeskyFactor factor(pattern);
+    // A bad pivot in any panel, and numbers that are none; those that wait for it are let go.
+    for (const double bad_value : {-1e6, std::numeric_limits<double>::quiet_NaN()})
+      for (const std::size_t entry : {std::size_t{0}, good.values().size() / 2, good.values().size() - 1}) {
+        BlockMatrix bad = good;
+        bad.values()[entry] = bad_value;
+        EXPECT_FALSE(factor.factorize(bad)) << threads << ' ' << entry;
+      }
+    ASSERT_TRUE(factor.factorize(good));
+    if (expected.size() == 0) expected = factor.solve(rhs);
+    EXPECT_TRUE(factor.solve(rhs) == expected) << threads;
+    // Within a parallel loop the inner one is serial: nobody may wait for a thread that never comes.
+    parallel_for(2, [&](std::int64_t i) {
+      if (i != 0) return;
+      EXPECT_TRUE(factor.factorize(good));
+    });
+    EXPECT_TRUE(factor.solve(rhs) == expected) << threads;
   }
 }
 
