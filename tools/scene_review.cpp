@@ -51,6 +51,17 @@ void review_wrinkles(const SceneModel& scene_model, std::vector<std::string>& wa
                        "higher /skin/order)");
 }
 
+/// Where bone or ligaments make it skin: numbers without a unit are MPa, and kPa are meant too often.
+void review_moduli(const Scene& scene, std::vector<std::string>& warnings) {
+  constexpr double softest = 1e-4, stiffest = 10;  // MPa, of skin in the literature with room to spare
+  if (!scene.base && !scene.ligaments) return;
+  for (const LayerScene& layer : scene.skin.layers)
+    if (layer.youngs_modulus < softest || layer.youngs_modulus > stiffest)
+      warnings.push_back("/skin/layers/" + layer.name + "/youngs_modulus: " +
+                         format_quantity(layer.youngs_modulus, dimension::pressure) +
+                         " is far from skin's 0.1 kPa to 10 MPa: is the unit right? Numbers without one are MPa");
+}
+
 void review_support(const SceneModel& scene_model, const StepCost& cost, std::vector<std::string>& warnings) {
   const Scene& scene = scene_model.scene();
   if (scene.skin.rim == RimCondition::clamped || !scene.skin.held.empty()) return;
@@ -187,6 +198,7 @@ void review_base(const SceneModel& scene_model, std::vector<std::string>& warnin
 
 std::vector<std::string> review_scene(const SceneModel& scene_model, const StepCost& cost) {
   std::vector<std::string> warnings;
+  review_moduli(scene_model.scene(), warnings);
   review_base(scene_model, warnings);
   review_support(scene_model, cost, warnings);
   review_wrinkles(scene_model, warnings);

@@ -24,7 +24,8 @@ class Certify : public Verb {
         "random direction and along the gradient by full simulations at nearby parameters, the identity "
         "that scaling all stiffnesses together moves nothing, error bars of a loosely converged run, how "
         "near to singular each step is, and that repetition gives the same bits. Run it before trusting a "
-        "fit of a new scene. It takes the time of a few simulations; --thorough tests every parameter on "
+        "fit of a new scene. It takes the time of ten to thirty simulations; --thorough tests every "
+        "parameter on "
         "its own as well.",
         "scene.json and what it names",
         "certificate.txt, certificate.json; prints the same text",

@@ -58,7 +58,7 @@ void add_verdict(HtmlPage& page, const FitResult& fit) {
   if (fit.reduced_chi_square > 0) {
     text += " The misfit is " + short_text(std::sqrt(fit.reduced_chi_square), 3) +
             " times what the tracker's own noise explains";
-    text += fit.reduced_chi_square > 1 ? "; the intervals are widened by that factor." : ".";
+    text += fit.reduced_chi_square > 1 ? "; the intervals are wider for it (the notes of the fit say how)." : ".";
   }
   page.paragraph(text);
   if (!fit.converged) {
@@ -175,10 +175,15 @@ void add_answer(HtmlPage& page, const ReportData& data) {
   if (!fit.gauge.empty()) {
     page.heading("What was held fixed");
     page.paragraph(fit.gauge);
+    page.paragraph(
+        "All else in the scene, from Poisson's ratios and relaxation to the stiffness of ligaments, bone and "
+        "finger, stayed at the values that the scene gives (rhytid check SCENE --parameters lists them). The "
+        "intervals hold if those values do.");
   }
   page.heading("What this footage cannot tell");
   if (fit.cannot_tell.empty()) {
-    page.paragraph("The fit names nothing among the fitted parameters that the footage leaves open.");
+    page.paragraph("Each fitted parameter is determined by this footage on its own. Which of them trade off against each "
+        "other, so that one may be wrong where another makes up for it, is told under identifiability.");
   } else {
     page.list(fit.cannot_tell);
   }
