@@ -57,9 +57,10 @@ void review_moduli(const Scene& scene, std::vector<std::string>& warnings) {
   if (!scene.base && !scene.ligaments) return;
   for (const LayerScene& layer : scene.skin.layers)
     if (layer.youngs_modulus < softest || layer.youngs_modulus > stiffest)
-      warnings.push_back("/skin/layers/" + layer.name + "/youngs_modulus: " +
-                         format_quantity(layer.youngs_modulus, dimension::pressure) +
-                         " is far from skin's 0.1 kPa to 10 MPa: is the unit right? Numbers without one are MPa");
+      warnings.push_back(
+          "/skin/layers/" + layer.name +
+          "/youngs_modulus: " + format_quantity(layer.youngs_modulus, dimension::pressure) +
+          " is far from skin's 0.1 kPa to 10 MPa: is the unit right? Numbers without one are MPa");
 }
 
 void review_support(const SceneModel& scene_model, const StepCost& cost, std::vector<std::string>& warnings) {
