@@ -58,7 +58,8 @@ void add_verdict(HtmlPage& page, const FitResult& fit) {
   if (fit.reduced_chi_square > 0) {
     text += " The misfit is " + short_text(std::sqrt(fit.reduced_chi_square), 3) +
             " times what the tracker's own noise explains";
-    text += fit.reduced_chi_square > 1 ? "; the intervals are wider for it (the notes of the fit say how)." : ".";
+    text +=
+        fit.reduced_chi_square > 1 ? "; the intervals are wider for it (the notes of the fit say how)." : ".";
   }
   page.paragraph(text);
   if (!fit.converged) {
@@ -182,7 +183,9 @@ void add_answer(HtmlPage& page, const ReportData& data) {
   }
   page.heading("What this footage cannot tell");
   if (fit.cannot_tell.empty()) {
-    page.paragraph("Each fitted parameter is determined by this footage on its own. Which of them trade off against each "
+    page.paragraph(
+        "Each fitted parameter is determined by this footage on its own. Which of them trade off against "
+        "each "
         "other, so that one may be wrong where another makes up for it, is told under identifiability.");
   } else {
     page.list(fit.cannot_tell);
