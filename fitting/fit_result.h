@@ -51,9 +51,8 @@ struct FitResult {
   std::string gauge;  ///< sentence: what was held fixed and why
   double initial_cost = 0, final_cost = 0;
   int num_observations = 0, num_tracks = 0, tracks_left_out = 0, frames = 0;
-  double rms_px = 0;  ///< of the residuals
-  double reduced_chi_square =
-      0;  ///< 2·cost / degrees of freedom; above 1 it widens the intervals (the notes)
+  double rms_px = 0;              ///< of the residuals
+  double reduced_chi_square = 0;  ///< 2·cost / degrees of freedom; above 1, intervals are wider
   int forward_runs = 0, jacobian_runs = 0;
   double seconds = 0, forward_seconds = 0;  ///< whole fit; median forward run
   std::vector<FitIteration> history;

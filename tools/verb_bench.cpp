@@ -1,6 +1,7 @@
 // rhytid bench: benchmarks of the simulator, one per subcommand (tools/bench).
 #include <CLI/CLI.hpp>
 
+#include "adjoint/sweeps.h"
 #include "sim/core/error.h"
 #include "tools/bench/benchmark.h"
 
@@ -46,7 +47,12 @@ class Bench : public Verb {
     CommonOptions options = context.options;
     options.output = output_.empty() ? "run/bench_" + chosen_->help().name : output_;
     VerbContext own{options, context.program, context.progress, context.out};
-    return chosen_->run(own, own.output_folder());
+    try {
+      return chosen_->run(own, own.output_folder());
+    } catch (const adjoint::GradientError& error) {
+      context.progress.error(error.what());
+      return ExitCode::not_converged;
+    }
   }
 
  private:

@@ -186,24 +186,10 @@ struct PackedSpectrum {
     eigen_sym3_packed(y, e, q);
     for (int i = 0; i < 3; ++i) log_eigenvalue[i] = map_lanes([](double x) { return std::log1p(x); }, e[i]);
   }
-  /// Σ_i g_i q_i q_iᵀ.
-  void compose(const V* g, V* out) const {
-    for (int c = 0; c < 6; ++c) {
-      const int i = kSymRow[c], j = kSymCol[c];
-      out[c] = g[0] * q[i][0] * q[j][0] + g[1] * q[i][1] * q[j][1] + g[2] * q[i][2] * q[j][2];
-    }
-  }
   /// partial[o][i] = ∂out_o/∂Y_i of the matrix function with divided differences f (symmetric storage).
   void frechet(const V* f, V (*partial)[ReverseTape<V>::kBlockInputs]) const {
-    V there[6][6];  // (Qᵀ dY Q)_c = Σ_e there[c][e] dY_e
-    for (int c = 0; c < 6; ++c) {
-      const int i = kSymRow[c], j = kSymCol[c];
-      for (int e = 0; e < 6; ++e) {
-        const int k = kSymRow[e], l = kSymCol[e];
-        there[c][e] = q[k][i] * q[l][j];
-        if (e >= 3) there[c][e] += q[l][i] * q[k][j];
-      }
-    }
+    V there[6][6];
+    rotation_of_symmetric(q, there);
     // Back: Q M Qᵀ takes the same products, halved for the rows off the diagonal and doubled for the columns.
     for (int o = 0; o < 6; ++o)
       for (int e = 0; e < 6; ++e) {
@@ -242,7 +228,7 @@ void log_one_plus(const Reverse<V>* y, Reverse<V>* out) {
   V y0[6], value[6], f[6], partial[6][ReverseTape<V>::kBlockInputs];
   for (int c = 0; c < 6; ++c) y0[c] = y[c].v;
   const PackedSpectrum<V> s(y0);
-  s.compose(s.log_eigenvalue, value);
+  compose(s.q, s.log_eigenvalue, value);
   for (int c = 0; c < 6; ++c) {
     const V a = s.log_eigenvalue[kSymRow[c]], b = s.log_eigenvalue[kSymCol[c]];
     f[c] =
@@ -261,9 +247,9 @@ void power_one_plus(const Reverse<V>* y, const Reverse<V>& t, Reverse<V>* out) {
   const PackedSpectrum<V> s(y0);
   for (int i = 0; i < 3; ++i)
     g[i] = map_lanes([](double x) { return std::expm1(x); }, V(t.v * s.log_eigenvalue[i]));
-  s.compose(g, value);
+  compose(s.q, g, value);
   for (int i = 0; i < 3; ++i) g[i] = (g[i] + 1.0) * s.log_eigenvalue[i];
-  s.compose(g, by_t);
+  compose(s.q, g, by_t);
   for (int c = 0; c < 6; ++c) {
     const V a = s.log_eigenvalue[kSymRow[c]], b = s.log_eigenvalue[kSymCol[c]], delta = 0.5 * (a - b);
     f[c] = t.v * exp_of(V(0.5 * (t.v - 1.0) * (a + b))) * packed_sinhc(V(t.v * delta)) / packed_sinhc(delta);

@@ -145,11 +145,26 @@ inline void spectrum_one_plus(const double* y, Spectrum& s) {
   for (int i = 0; i < 3; ++i) s.log_eigenvalue[i] = std::log1p(e[i]);
 }
 
-/// Σ_i g_i q_i q_iᵀ.
-inline void compose(const Spectrum& s, const double* g, double* out) {
+/// Σ_i g_i q_i q_iᵀ, q_i the columns of q. V is double or a pack.
+template <class V>
+void compose(const V (*q)[3], const V* g, V* out) {
   for (int c = 0; c < 6; ++c) {
     const int i = kSymRow[c], j = kSymCol[c];
-    out[c] = g[0] * s.q[i][0] * s.q[j][0] + g[1] * s.q[i][1] * s.q[j][1] + g[2] * s.q[i][2] * s.q[j][2];
+    out[c] = g[0] * q[i][0] * q[j][0] + g[1] * q[i][1] * q[j][1] + g[2] * q[i][2] * q[j][2];
+  }
+}
+
+/// First `count` rows of the matrix that takes dY to the frame of the columns of q:
+/// (Qᵀ dY Q)_c = Σ_e rotate[c][e] dY_e, in symmetric storage. V is double or a pack.
+template <class V>
+void rotation_of_symmetric(const V (*q)[3], V (*rotate)[6], int count = 6) {
+  for (int c = 0; c < count; ++c) {
+    const int i = kSymRow[c], j = kSymCol[c];
+    for (int e = 0; e < 6; ++e) {
+      const int k = kSymRow[e], l = kSymCol[e];
+      rotate[c][e] = q[k][i] * q[l][j];
+      if (e >= 3) rotate[c][e] += q[l][i] * q[k][j];
+    }
   }
 }
 
@@ -157,14 +172,8 @@ inline void compose(const Spectrum& s, const double* g, double* out) {
 /// storage.
 template <int N>
 void frechet(const Spectrum& s, const double* f, const Dual<N>* y, Dual<N>* out) {
-  double rotate[6][6];  // (Qᵀ dY Q)_c = Σ_e rotate[c][e] dY_e ; its transpose (with weights) rotates back
-  for (int c = 0; c < 6; ++c) {
-    const int i = kSymRow[c], j = kSymCol[c];
-    for (int e = 0; e < 6; ++e) {
-      const int k = kSymRow[e], l = kSymCol[e];
-      rotate[c][e] = e < 3 ? s.q[k][i] * s.q[k][j] : s.q[k][i] * s.q[l][j] + s.q[l][i] * s.q[k][j];
-    }
-  }
+  double rotate[6][6];  // its transpose (with weights) rotates back
+  rotation_of_symmetric(s.q, rotate);
   double m[6][N];
   for (int c = 0; c < 6; ++c) {
     for (int n = 0; n < N; ++n) m[c][n] = 0;
@@ -187,7 +196,7 @@ void frechet(const Spectrum& s, const double* f, const Dual<N>* y, Dual<N>* out)
 inline void log_one_plus(const double* y, double* out) {
   Spectrum s;
   spectrum_one_plus(y, s);
-  compose(s, s.log_eigenvalue, out);
+  compose(s.q, s.log_eigenvalue, out);
 }
 template <int N>
 void log_one_plus(const Dual<N>* y, Dual<N>* out) {
@@ -195,7 +204,7 @@ void log_one_plus(const Dual<N>* y, Dual<N>* out) {
   for (int c = 0; c < 6; ++c) y0[c] = y[c].v;
   Spectrum s;
   spectrum_one_plus(y0, s);
-  compose(s, s.log_eigenvalue, value);
+  compose(s.q, s.log_eigenvalue, value);
   for (int c = 0; c < 6; ++c) {
     const double a = s.log_eigenvalue[kSymRow[c]], b = s.log_eigenvalue[kSymCol[c]];
     f[c] = std::exp(-0.5 * (a + b)) / sinhc(0.5 * (a - b));
@@ -210,7 +219,7 @@ inline void power_one_plus(const double* y, double t, double* out) {
   spectrum_one_plus(y, s);
   double g[3];
   for (int i = 0; i < 3; ++i) g[i] = std::expm1(t * s.log_eigenvalue[i]);
-  compose(s, g, out);
+  compose(s.q, g, out);
 }
 template <int N>
 void power_one_plus(const Dual<N>* y, const Dual<N>& t, Dual<N>* out) {
@@ -219,9 +228,9 @@ void power_one_plus(const Dual<N>* y, const Dual<N>& t, Dual<N>* out) {
   Spectrum s;
   spectrum_one_plus(y0, s);
   for (int i = 0; i < 3; ++i) g[i] = std::expm1(t.v * s.log_eigenvalue[i]);
-  compose(s, g, value);
+  compose(s.q, g, value);
   for (int i = 0; i < 3; ++i) g[i] = (g[i] + 1) * s.log_eigenvalue[i];  // d(a^t)/dt = a^t ln a
-  compose(s, g, by_t);
+  compose(s.q, g, by_t);
   for (int c = 0; c < 6; ++c) {
     const double a = s.log_eigenvalue[kSymRow[c]], b = s.log_eigenvalue[kSymCol[c]], delta = 0.5 * (a - b);
     f[c] = t.v * std::exp(0.5 * (t.v - 1) * (a + b)) * sinhc(t.v * delta) / sinhc(delta);

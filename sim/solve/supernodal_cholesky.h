@@ -14,11 +14,12 @@
 
 #include <cholmod.h>
 
-#include <memory>
+#include <cstddef>
 #include <vector>
 
 namespace rhytid {
 
+/// The numeric phase for one factor: what is computed from what is found once.
 class SupernodalCholesky {
  public:
   /// `factor` is supernodal with values allocated (any), 32-bit indices; it must outlive this.

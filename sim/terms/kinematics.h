@@ -40,6 +40,34 @@ struct PrismKinematics {
     return tr + minors + det;
   }
   static bool feasible(const double* h) { return det_minus_one_of(h) > -1; }
+  /// F_aI.
+  template <class V>
+  static V deformation(const V* h, int a, int i) {
+    return a == i ? h[3 * a + i] + 1.0 : h[3 * a + i];
+  }
+  /// dY from dH: dY_IJ = Σ_a F_aI dH_aJ + F_aJ dH_aI.
+  template <class V>
+  static void strain_direction(const V* h, const V* dh, V* dy) {
+    for (int c = 0; c < 6; ++c) {
+      const int i = kSymRow[c], j = kSymCol[c];
+      V sum = {};
+      for (int a = 0; a < 3; ++a)
+        sum += deformation(h, a, i) * dh[3 * a + j] + deformation(h, a, j) * dh[3 * a + i];
+      dy[c] = sum;
+    }
+  }
+  /// Its transpose: H̄_aI = Σ_J F_aJ S_IJ, S = 2 Ȳ on the diagonal and Ȳ beside it. For Ȳ = σ the first
+  /// Piola stress.
+  template <class V>
+  static void strain_transpose(const V* h, const V* y_bar, V* h_bar) {
+    for (int a = 0; a < 3; ++a)
+      for (int i = 0; i < 3; ++i) {
+        V sum = {};
+        for (int j = 0; j < 3; ++j)
+          sum += deformation(h, a, j) * (i == j ? 2.0 * y_bar[i] : y_bar[kSym[i][j]]);
+        h_bar[3 * a + i] = sum;
+      }
+  }
 
   /// ∂Y_c/∂H_aI = F_ak δ_lI + F_al δ_kI for c = (k, l).
   static void strain_gradient(const double* h, double (*b)[9]) {

@@ -71,17 +71,8 @@ struct PackedKernel {
       Lanes sigma[ne];
       total += p.weight * law.template response<Lanes>(p.y, p.prepared, p.theta, p.constants, sigma, nullptr);
       if (!f) continue;
-      // First Piola stress: P_aI = Σ_J F_aJ S_IJ, S = 2σ on the diagonal, σ beside it.
       Lanes piola[nz], local[nz];
-      for (int a = 0; a < 3; ++a)
-        for (int i = 0; i < 3; ++i) {
-          Lanes sum = {};
-          for (int j = 0; j < 3; ++j) {
-            const Lanes s = i == j ? 2.0 * sigma[i] : sigma[kSym[i][j]];
-            sum += deformation(p.h, a, j) * s;
-          }
-          piola[3 * a + i] = sum;
-        }
+      Kin::strain_transpose(p.h, sigma, piola);
       Kin::from_point(piola, p.jacobian, p.weight, local);
       const int count = v.num_points - first < kLanes ? v.num_points - first : kLanes;
       for (int k = 0; k < count; ++k)
@@ -130,15 +121,11 @@ struct PackedKernel {
   }
 
  private:
-  static Lanes deformation(const Lanes* h, int a, int i) {
-    return a == i ? h[3 * a + i] + 1.0 : h[3 * a + i];
-  }
-
   /// a_(aI)(bJ) = Σ_KL F_aK D_(IK)(JL) F_bL, D the tangent by full index pairs: twice along a diagonal pair.
   static void material_block(const Lanes* h, const Lanes (*tangent)[ne], Lanes (*a)[nz]) {
     Lanes f[3][3], db[ne][nz];
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) f[i][j] = deformation(h, i, j);
+      for (int j = 0; j < 3; ++j) f[i][j] = Kin::deformation(h, i, j);
     for (int c = 0; c < ne; ++c)
       for (int b = 0; b < 3; ++b)
         for (int j = 0; j < 3; ++j) {

@@ -15,6 +15,7 @@
 namespace rhytid {
 inline namespace RHYTID_ISA {
 
+/// Adjoint blocks of a law on prisms; pointers and shapes as in PointKernel, whose functions these stand in for.
 template <class Law, class Kin>
 struct ReverseKernel {
   static constexpr int ne = Law::ne, nz = Kin::nz, ns = Law::ns, np = Law::np, nt = Law::ntheta;
@@ -29,14 +30,14 @@ struct ReverseKernel {
   /// Points first … first + width − 1; past the element's end the last point is repeated.
   struct Pack {
     const ElementView& v;
-    int first, count;
-    int point[width];
+    int count;         ///< of them inside the element
+    int point[width];  ///< index of each
 
     Pack(const ElementView& view, int start)
-        : v(view), first(start), count(v.num_points - start < width ? v.num_points - start : width) {
+        : v(view), count(v.num_points - start < width ? v.num_points - start : width) {
       for (int k = 0; k < width; ++k) point[k] = start + (k < count ? k : count - 1);
     }
-    /// Component c of per-point data [nq][stride].
+    /// Component c of per-point data [nq][stride]; stride 0: the same at all points.
     V load(const double* values, int stride, int c) const {
       double numbers[width];
       for (int k = 0; k < width; ++k) numbers[k] = values[point[k] * stride + c];
@@ -51,12 +52,8 @@ struct ReverseKernel {
     }
     void load_theta(Number* theta, bool inputs) const {
       for (int c = 0; c < nt; ++c) {
-        double numbers[width];
-        for (int k = 0; k < width; ++k)
-          numbers[k] = v.theta[static_cast<std::size_t>(point[k]) * v.theta_stride + c];
-        V lanes;
-        std::memcpy(&lanes, numbers, sizeof lanes);
-        theta[c] = inputs ? Number::input(lanes) : Number::constant(lanes);
+        const V value = load(v.theta, v.theta_stride, c);
+        theta[c] = inputs ? Number::input(value) : Number::constant(value);
       }
     }
     void load_jacobian(V* jacobian) const {
@@ -78,32 +75,6 @@ struct ReverseKernel {
     }
     const double* rest() const { return v.rest ? v.rest + point[0] * Law::nrest : nullptr; }
   };
-
-  /// z̄ from Ȳ: the transpose of ∂Y/∂H, H̄_aI = Σ_J F_aJ S̄_IJ with S̄ = 2 Ȳ on the diagonal, Ȳ beside it.
-  static void strain_transpose(const V* h, const V* y_bar, V* h_bar) {
-    for (int a = 0; a < 3; ++a)
-      for (int i = 0; i < 3; ++i) {
-        V sum = {};
-        for (int j = 0; j < 3; ++j) {
-          const V f = a == j ? h[3 * a + j] + 1.0 : h[3 * a + j];
-          sum += f * (i == j ? 2.0 * y_bar[i] : y_bar[kSym[i][j]]);
-        }
-        h_bar[3 * a + i] = sum;
-      }
-  }
-  /// dY from dH: its transpose.
-  static void strain_direction(const V* h, const V* dh, V* dy) {
-    for (int c = 0; c < 6; ++c) {
-      const int i = kSymRow[c], j = kSymCol[c];
-      V sum = {};
-      for (int a = 0; a < 3; ++a) {
-        const V fi = a == i ? h[3 * a + i] + 1.0 : h[3 * a + i],
-                fj = a == j ? h[3 * a + j] + 1.0 : h[3 * a + j];
-        sum += fi * dh[3 * a + j] + fj * dh[3 * a + i];
-      }
-      dy[c] = sum;
-    }
-  }
 
   /// As PointKernel::adjoint_update.
   static void adjoint_update(const Law& law, const ElementView& v, const double* u, const double* prepared,
@@ -128,7 +99,7 @@ struct ReverseKernel {
         for (int c = 0; c < ns; ++c) tape.bar(s_new[c].node) += p.load(s_bar, ns, c);
         tape.sweep();
         for (int c = 0; c < ne; ++c) y_bar[c] = tape.bar(e[c].node);
-        strain_transpose(h, y_bar, h_bar);
+        Kin::strain_transpose(h, y_bar, h_bar);
         p.store_gradient(h_bar, jacobian, out);
       }
       scatter<3>(v, out, u_bar);
@@ -151,7 +122,7 @@ struct ReverseKernel {
       p.load_gradient(natural, jacobian, h);
       p.load_gradient(natural_adj, jacobian, dh);
       Kin::strain(h, y);
-      strain_direction(h, dh, dy);
+      Kin::strain_direction(h, dh, dy);
       const V weight = p.load(v.weight, 1, 0);
       V prepared_bar[at_least_one(np)], theta_sum[nt];
       {
@@ -183,7 +154,7 @@ struct ReverseKernel {
         for (int c = 0; c < np; ++c) tape.bar(made[c].node) += prepared_bar[c];
         tape.sweep();
         for (int c = 0; c < ne; ++c) y_bar[c] = tape.bar(e[c].node);
-        strain_transpose(h_old, y_bar, h_bar);
+        Kin::strain_transpose(h_old, y_bar, h_bar);
         p.store_gradient(h_bar, jacobian, out);
         for (int c = 0; c < ns; ++c) p.store(tape.bar(s[c].node), s_old_bar, ns, c);
         for (int c = 0; c < nt; ++c) theta_sum[c] += tape.bar(theta[c].node);

@@ -50,16 +50,8 @@ void spring_state(const V* y, SpringState<V>& s) {
 template <class V>
 void add_spring(const SpringState<V>& s, const V& f, const V& p, const V& g, const V& h, V* sigma,
                 V (*tangent)[6]) {
-  V r[6][6];  // (Q^T dY Q)_a = Σ_e r[a][e] dY_e
-  const int pairs = tangent ? 6 : 3;
-  for (int a = 0; a < pairs; ++a) {
-    const int i = kSymRow[a], j = kSymCol[a];
-    for (int e = 0; e < 6; ++e) {
-      const int k = kSymRow[e], l = kSymCol[e];
-      r[a][e] = s.vectors[k][i] * s.vectors[l][j];
-      if (e >= 3) r[a][e] += s.vectors[l][i] * s.vectors[k][j];
-    }
-  }
+  V r[6][6];
+  rotation_of_symmetric(s.vectors, r, tangent ? 6 : 3);
   V t[3], inverse[3];
   for (int i = 0; i < 3; ++i) {
     t[i] = f * s.deviator[i] + p;

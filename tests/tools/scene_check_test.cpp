@@ -166,6 +166,14 @@ TEST(Review, names_what_holds_nothing) {
               Contains(HasSubstr("neither ligaments nor base")));
 }
 
+TEST(Review, doubts_moduli_that_no_skin_has) {
+  const auto doubt = HasSubstr("/skin/layers/film/youngs_modulus: 60 MPa is far from skin's");
+  EXPECT_THAT(review({"/skin/layers/film/youngs_modulus=60"}), Contains(doubt));
+  EXPECT_THAT(review({"/skin/layers/film/youngs_modulus=60 kPa"}), Each(Not(HasSubstr("far from"))));
+  EXPECT_THAT(review({"/skin/layers/soft/youngs_modulus=20 Pa"}),
+              Contains(HasSubstr("/skin/layers/soft/youngs_modulus: 20 Pa is far from")));
+}
+
 TEST(Review, names_colliders_and_sources_that_miss) {
   EXPECT_THAT(review({"/colliders/finger/path/1/position=[-2, 0, 5.5]",
                       "/colliders/finger/path/2/position=[-2, 0, 5.5]"}),

@@ -21,7 +21,8 @@ class Benchmark {
   virtual ~Benchmark() = default;
   virtual BenchmarkHelp help() const = 0;
   virtual void add_options(CLI::App&) {}
-  /// Writes tables into `folder` (exists) and a short account to context.out.
+  /// Writes tables into `folder` (exists) and a short account to context.out. An adjoint::GradientError (a run
+  /// that ended early, or that has no gradient) becomes one line and exit code 3.
   virtual ExitCode run(VerbContext& context, const std::string& folder) = 0;
 };
 

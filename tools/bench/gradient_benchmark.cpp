@@ -81,12 +81,7 @@ class GradientBenchmark : public Benchmark {
 
   ExitCode run(VerbContext& context, const std::string& folder) override {
     Tables tables;
-    try {
-      for (const BenchScene& one : scenes_.load(context, folder)) measure(context, one, tables, folder);
-    } catch (const adjoint::GradientError& error) {
-      context.progress.error(error.what());
-      return ExitCode::not_converged;
-    }
+    for (const BenchScene& one : scenes_.load(context, folder)) measure(context, one, tables, folder);
     if (context.progress.interrupted()) return ExitCode::interrupted;
     context.out << tables.markdown() << folder << "/gradient.csv\n";
     return ExitCode::ok;

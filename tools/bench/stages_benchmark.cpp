@@ -94,19 +94,14 @@ class StagesBenchmark : public Benchmark {
   ExitCode run(VerbContext& context, const std::string& folder) override {
     Tables tables(measure_machine_limits());
     const auto go_on = [&] { return !context.progress.interrupted(); };
-    try {
-      for (const BenchScene& one : scenes_.load(context, folder)) {
-        context.progress.stage(one.name, 1);
-        const SceneModel scene_model(one.scene);
-        const std::optional<StageReport> report = measure_stages(scene_model, seconds_, go_on);
-        context.progress.finish();
-        if (!report) return ExitCode::interrupted;
-        tables.add(one.name, *report);
-        tables.write(folder);
-      }
-    } catch (const adjoint::GradientError& error) {
-      context.progress.error(error.what());
-      return ExitCode::not_converged;
+    for (const BenchScene& one : scenes_.load(context, folder)) {
+      context.progress.stage(one.name, 1);
+      const SceneModel scene_model(one.scene);
+      const std::optional<StageReport> report = measure_stages(scene_model, seconds_, go_on);
+      context.progress.finish();
+      if (!report) return ExitCode::interrupted;
+      tables.add(one.name, *report);
+      tables.write(folder);
     }
     context.out << tables.markdown() << "\n" << folder << "/stages.csv\n";
     return ExitCode::ok;
