@@ -12,7 +12,8 @@ class Bench : public Verb {
  public:
   VerbHelp help() const override {
     return {"bench",
-            "benchmarks of the simulator: stability, time of every stage, gradients, tolerances, memory",
+            "benchmarks of the simulator: stability, time of every stage, gradients, tolerances, memory, "
+            "minimisers",
             "Runs one benchmark and writes its tables. `stability` takes every setting to its extremes on a "
             "small "
             "scene; the others measure a drag over a patch of any size, or a scene of yours (--scene).",

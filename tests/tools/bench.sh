@@ -44,10 +44,23 @@ paste -d, <(column "$folder/tolerance/tolerance.csv" functional_error) <(column 
 expect 0 memory "${small[@]}" -o "$folder/memory"
 [ "$(column "$folder/memory/memory.csv" same_bits | grep -c yes)" = 5 ] || fail "bits of gradients within budgets"
 
+# All minimisers end at the same states; what is stopped is a row, not a failure.
+expect 0 minimisers --nodes 600 --frames 4 -o "$folder/minimisers"
+[ "$(column "$folder/minimisers/minimisers.csv" outcome | grep -cx complete)" = 4 ] || fail "outcomes of minimisers"
+column "$folder/minimisers/minimisers.csv" largest_displacement_difference_mm |
+  awk 'NR > 1 && !($1 > 0 && $1 < 1e-6) { bad = 1 } END { exit bad || NR != 4 }' || fail "minimisers differ"
+paste -d, <(column "$folder/minimisers/minimisers.csv" iterations) <(column "$folder/minimisers/minimisers.csv" factorisations) |
+  awk -F, 'NR < 3 && !($2 >= $1) || NR > 2 && !($2 < $1) { exit 1 }' || fail "factorisations of minimisers"
+expect 0 minimisers --scene "$folder/stages/patch_600.json" --frames 2 --minimisers lbfgs_literal,newton --limit 0 --repeats 2 -o "$folder/limit"
+[ "$(column "$folder/limit/minimisers.csv" outcome | grep -c 'stopped after 0 s in frame 1')" = 2 ] || fail "the limit"
+expect 0 minimisers --scene "$folder/stages/patch_600.json" --frames 2 --minimisers newton -o "$folder/first"
+[ "$(column "$folder/first/minimisers.csv" frames)" = 2 ] || fail "the first frames of a scene"
+
 # A scene of the user's, and what is refused.
 expect 0 gradient --scene "$folder/stages/patch_600.json" --set /time/frames=1 --repeats 1 --parameters 1 -o "$folder/own"
 expect 2 gradient --scene "$folder/none.json" -o "$folder/x"
 expect 2 stages --nodes 10 -o "$folder/x"
 expect 2 tolerance --tolerances 2 -o "$folder/x"
+expect 2 minimisers --minimisers simplex -o "$folder/x"
 expect 2 nonsense -o "$folder/x"
 exit "$failures"

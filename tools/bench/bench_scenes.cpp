@@ -53,8 +53,10 @@ void BenchSceneOptions::add_options(CLI::App& app) {
       ->option_text("N,...")
       ->check(CLI::Range(600, 1000000));
   app.add_option("--frames", frames_,
-                 "frames of the drag over the patch (default " + std::to_string(frames_) + ")")
+                 "frames of the drag over the patch (default " + std::to_string(frames_) +
+                     "); with --scene its first N (default all)")
       ->option_text("N")
+      ->each([this](const std::string&) { frames_given_ = true; })
       ->check(CLI::Range(1, 10000));
   app.add_option("--scene", file_, "a scene of yours instead of the patch")->option_text("FILE");
   app.add_option("--set", settings_, "change one value of the scenes; may be repeated")
@@ -68,6 +70,8 @@ std::vector<BenchScene> BenchSceneOptions::load(VerbContext& context, const std:
   if (!file_.empty()) {
     scenes.push_back({file_, load_scene_argument(file_, settings_, context.progress)});
     require_frames(scenes.front().scene, file_);
+    int& frames = scenes.front().scene.time.frames;
+    if (frames_given_) frames = std::min(frames, frames_);
     return scenes;
   }
   for (const int nodes : nodes_) {

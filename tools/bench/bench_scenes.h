@@ -26,12 +26,13 @@ class BenchSceneOptions {
  public:
   explicit BenchSceneOptions(int frames) : frames_(frames) {}
   void add_options(CLI::App& app);
-  /// The user's scene, or patches, whose files are written into `folder`; settings of the command line apply
-  /// to either. Throws InputError as load_scene does.
+  /// The user's scene, of which --frames keeps the first, or patches, whose files are written into `folder`;
+  /// settings of the command line apply to either. Throws InputError as load_scene does.
   std::vector<BenchScene> load(VerbContext& context, const std::string& folder) const;
 
  private:
   int frames_;
+  bool frames_given_ = false;
   std::vector<int> nodes_ = {2000, 8000};
   std::string file_;
   std::vector<std::string> settings_;
