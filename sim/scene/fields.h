@@ -207,6 +207,7 @@ void fields(Archive& archive, T& solver) {
   archive("max_iterations", solver.max_iterations);
   archive("lbfgs_memory", solver.lbfgs_memory);
   archive("lbfgs_refresh", solver.lbfgs_refresh);
+  archive("factor_precision", solver.factor_precision);
 }
 
 template <class Archive, FieldsOf<OutputScene> T>

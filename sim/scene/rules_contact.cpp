@@ -283,6 +283,14 @@ std::vector<Rule> run_rules() {
        .min = 1,
        .max = 1e6,
        .doc = "Iterations between new seed Hessians of L-BFGS; 50 with lbfgs_literal."},
+      {.pointer = "/solver/factor_precision",
+       .type = option,
+       .fallback = solver.factor_precision,
+       .options = {"automatic", "full", "mixed"},
+       .doc =
+           "mixed: the iterations go by factors in single precision, corrected in double; certificate, "
+           "derivatives and lbfgs_literal have double precision in any case. automatic: mixed where factors "
+           "are large."},
       {.pointer = "/output", .type = object, .fallback = json::object(), .doc = "What is written."},
       {.pointer = "/output/vtu", .type = boolean, .fallback = output.vtu, .doc = "Fields of every frame."},
       {.pointer = "/output/pictures",

@@ -141,6 +141,7 @@ struct SolverScene {
   double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;
   int lbfgs_memory = 20, lbfgs_refresh = 20;
+  std::string factor_precision = "automatic";  ///< automatic | full | mixed (FactorPrecision)
 };
 
 /// Tension of the skin in its rest shape (sim/terms/pre_stretch_law.h).

@@ -72,6 +72,9 @@ RunOptions SceneModel::run_options() const {
   m.max_iterations = scene_.solver.max_iterations;
   m.lbfgs_memory = scene_.solver.lbfgs_memory;
   m.lbfgs_refresh = scene_.solver.lbfgs_refresh;
+  for (const FactorPrecision precision :
+       {FactorPrecision::automatic, FactorPrecision::full, FactorPrecision::mixed})
+    if (scene_.solver.factor_precision == name(precision)) m.precision = precision;
   return o;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -54,6 +55,10 @@ class BlockMatrix {
   std::vector<double> values_;
 };
 
+/// Of a factor's numbers. Those in single precision take about half the time and solve to some six digits less than
+/// the logarithm of the condition number: a preconditioner, no certificate.
+enum class Precision { full, single };
+
 /// Supernodal Cholesky over OpenBLAS: CHOLMOD analyses once per object, whose pattern must outlive it, and
 /// solves on the calling thread; numbers come from num_threads() threads, with the same bits for any number of
 /// them (supernodal_cholesky.h). Throws std::bad_alloc or std::length_error when the factor does not fit.
@@ -62,14 +67,22 @@ class CholeskyFactor {
   explicit CholeskyFactor(const BlockPattern& pattern);
   ~CholeskyFactor();
   CholeskyFactor(CholeskyFactor&&) noexcept;
-  /// Factorises A + shift·I. False when not positive definite or not finite (the factor is then unusable).
-  [[nodiscard]] bool factorize(const BlockMatrix& matrix, double shift = 0);
+  /// Factorises A + shift·I. False when not positive definite (in single precision: as far as that sees) or not
+  /// finite (the factor is then unusable).
+  [[nodiscard]] bool factorize(const BlockMatrix& matrix, double shift = 0,
+                               Precision precision = Precision::full);
   bool usable() const;
+  Precision precision() const;  ///< of the last factorisation
   /// Solves A X = B for [num_unknowns][k] right-hand sides, unpermuted order. One factor serves one thread at
   /// a time, also here (CHOLMOD's workspace is shared).
   MatrixXd solve(const MatrixXd& rhs) const;
   /// The same with one step of iterative refinement against `matrix`, which must be the matrix factorised.
   MatrixXd solve(const BlockMatrix& matrix, const MatrixXd& rhs) const;
+  /// The solution of A x = b by conjugate gradients with this factor as preconditioner, to |b − A x| ≤ tolerance
+  /// |b|; `matrix` must be the matrix factorised (without shift). Nothing when that takes more than
+  /// `max_iterations` or meets a direction of negative curvature.
+  std::optional<VectorXd> solve_iteratively(const BlockMatrix& matrix, const VectorXd& rhs, double tolerance,
+                                            int max_iterations) const;
   /// Smallest and largest diagonal of L², a cheap measure of how near to singular A is.
   double smallest_pivot() const;
   double largest_pivot() const;

@@ -25,9 +25,14 @@ struct CholeskyFactor::Impl {
   std::unique_ptr<cholmod_factor, Release> factor{nullptr, {&session}};
   std::optional<SupernodalCholesky> numbers;
   bool usable = false;
+  Precision precision = Precision::full;
   double smallest_pivot = 0, largest_pivot = 0, flops = 0;
 
   void measure_pivots();
+  MatrixXd permuted(const MatrixXd& rhs) const;
+  void permute_back(const Eigen::Ref<const MatrixXd>& x, MatrixXd& result) const;
+  /// Columns in the factor's order, in place, with a factor in single precision.
+  void solve_single(MatrixXd& x) const;
 };
 
 CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
@@ -52,32 +57,58 @@ CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
 }
 
 void CholeskyFactor::Impl::measure_pivots() {
-  const int* super = static_cast<const int*>(factor->super);
-  const int* row_start = static_cast<const int*>(factor->pi);
-  const int* value_start = static_cast<const int*>(factor->px);
-  const double* x = static_cast<const double*>(factor->x);
   double low = std::numeric_limits<double>::infinity(), high = 0;
   bool finite = true;
-  for (std::size_t s = 0; s < factor->nsuper; ++s) {
-    const std::ptrdiff_t rows = row_start[s + 1] - row_start[s];
-    for (std::ptrdiff_t c = 0; c < super[s + 1] - super[s]; ++c) {
-      const double d = x[value_start[s] + c * (rows + 1)];
-      finite = finite && std::isfinite(d);
-      low = std::min(low, d);
-      high = std::max(high, d);
-    }
-  }
+  const auto visit = [&](double d) {
+    finite = finite && std::isfinite(d);
+    low = std::min(low, d);
+    high = std::max(high, d);
+  };
+  if (precision == Precision::full)
+    numbers->for_diagonal<double>(visit);
+  else
+    numbers->for_diagonal<float>(visit);
   // LAPACK kernels let a NaN pivot through as if it were positive.
   usable = finite && low > 0;
   smallest_pivot = usable ? low * low : 0;
   largest_pivot = usable ? high * high : 0;
 }
 
+MatrixXd CholeskyFactor::Impl::permuted(const MatrixXd& rhs) const {
+  const BlockPattern::Impl& p = pattern->impl();
+  MatrixXd result(rhs.rows(), rhs.cols());
+  for (Eigen::Index k = 0; k < rhs.cols(); ++k)
+    for (int b = 0; b < p.num_blocks; ++b)
+      result.col(k).segment<3>(3 * p.position[b]) = rhs.col(k).segment<3>(3 * b);
+  return result;
+}
+
+void CholeskyFactor::Impl::permute_back(const Eigen::Ref<const MatrixXd>& x, MatrixXd& result) const {
+  const BlockPattern::Impl& p = pattern->impl();
+  result.resize(x.rows(), x.cols());
+  for (Eigen::Index k = 0; k < x.cols(); ++k)
+    for (int b = 0; b < p.num_blocks; ++b)
+      result.col(k).segment<3>(3 * b) = x.col(k).segment<3>(3 * p.position[b]);
+}
+
+void CholeskyFactor::Impl::solve_single(MatrixXd& x) const {
+  const SingleThreadBlas blas;
+  Eigen::VectorXf column;
+  for (Eigen::Index k = 0; k < x.cols(); ++k) {
+    // Scaled, since floats overflow at 1e38 and lose digits below 1e-38.
+    const double scale = x.col(k).cwiseAbs().maxCoeff();
+    if (!(scale > 0)) continue;
+    column = (x.col(k) / scale).cast<float>();
+    numbers->solve(column.data());
+    x.col(k) = scale * column.cast<double>();
+  }
+}
+
 CholeskyFactor::CholeskyFactor(const BlockPattern& pattern) : impl_(std::make_unique<Impl>(pattern)) {}
 CholeskyFactor::~CholeskyFactor() = default;
 CholeskyFactor::CholeskyFactor(CholeskyFactor&&) noexcept = default;
 
-bool CholeskyFactor::factorize(const BlockMatrix& matrix, double shift) {
+bool CholeskyFactor::factorize(const BlockMatrix& matrix, double shift, Precision precision) {
   Impl& impl = *impl_;
   require(&matrix.pattern() == impl.pattern, "CholeskyFactor::factorize: the matrix has another pattern");
   impl.usable = false;
@@ -86,10 +117,17 @@ bool CholeskyFactor::factorize(const BlockMatrix& matrix, double shift) {
   // Before the scope: an OpenBLAS over OpenMP makes its one thread the default of OpenMP.
   const int threads = blas_is_reentrant() ? num_threads() : 1;
   const SingleThreadBlas blas;
-  if (impl.numbers->factorize(p.scalar_column_start.data(), p.scalar_rows.data(), matrix.values().data(),
-                              shift, threads))
-    impl.measure_pivots();
+  impl.precision = precision;
+  const auto factorize_in = [&]<class Real>(Real) {
+    return impl.numbers->factorize<Real>(p.scalar_column_start.data(), p.scalar_rows.data(),
+                                         matrix.values().data(), shift, threads);
+  };
+  if (precision == Precision::full ? factorize_in(double()) : factorize_in(float())) impl.measure_pivots();
   return impl.usable;
+}
+
+Precision CholeskyFactor::precision() const {
+  return impl_->precision;
 }
 
 bool CholeskyFactor::usable() const {
@@ -102,10 +140,12 @@ MatrixXd CholeskyFactor::solve(const MatrixXd& rhs) const {
   require(impl.usable, "CholeskyFactor::solve: no usable factor");
   require(rhs.rows() == 3 * p.num_blocks, "CholeskyFactor::solve: wrong number of rows");
   if (rhs.cols() == 0) return rhs;
-  MatrixXd permuted(rhs.rows(), rhs.cols());
-  for (Eigen::Index k = 0; k < rhs.cols(); ++k)
-    for (int b = 0; b < p.num_blocks; ++b)
-      permuted.col(k).segment<3>(3 * p.position[b]) = rhs.col(k).segment<3>(3 * b);
+  MatrixXd permuted = impl.permuted(rhs), result;
+  if (impl.precision == Precision::single) {
+    impl.solve_single(permuted);
+    impl.permute_back(permuted, result);
+    return result;
+  }
 
   cholmod_dense view{};
   view.nrow = view.d = static_cast<std::size_t>(rhs.rows());
@@ -122,10 +162,7 @@ MatrixXd CholeskyFactor::solve(const MatrixXd& rhs) const {
   throw_on_cholmod_error(*&impl.session);
 
   const Eigen::Map<const MatrixXd> x(static_cast<const double*>(solution->x), rhs.rows(), rhs.cols());
-  MatrixXd result(rhs.rows(), rhs.cols());
-  for (Eigen::Index k = 0; k < rhs.cols(); ++k)
-    for (int b = 0; b < p.num_blocks; ++b)
-      result.col(k).segment<3>(3 * b) = x.col(k).segment<3>(3 * p.position[b]);
+  impl.permute_back(x, result);
   return result;
 }
 
@@ -133,6 +170,27 @@ MatrixXd CholeskyFactor::solve(const BlockMatrix& matrix, const MatrixXd& rhs) c
   MatrixXd x = solve(rhs), residual(rhs.rows(), rhs.cols());
   for (Eigen::Index k = 0; k < rhs.cols(); ++k) residual.col(k) = rhs.col(k) - matrix.multiply(x.col(k));
   return x + solve(residual);
+}
+
+std::optional<VectorXd> CholeskyFactor::solve_iteratively(const BlockMatrix& matrix, const VectorXd& rhs,
+                                                          double tolerance, int max_iterations) const {
+  const double wanted = tolerance * rhs.norm();
+  VectorXd x = VectorXd::Zero(rhs.size()), r = rhs, direction;
+  double old_rz = 0;
+  for (int k = 0; k < max_iterations; ++k) {
+    if (r.norm() <= wanted) return x;
+    const VectorXd z = solve(r);
+    const double rz = r.dot(z);
+    direction = k == 0 ? z : VectorXd(z + rz / old_rz * direction);
+    const VectorXd product = matrix.multiply(direction);
+    const double curvature = direction.dot(product);
+    if (!(rz > 0 && curvature > 0)) return std::nullopt;
+    x += rz / curvature * direction;
+    r -= rz / curvature * product;
+    old_rz = rz;
+  }
+  if (r.norm() <= wanted) return x;
+  return std::nullopt;
 }
 
 double CholeskyFactor::smallest_pivot() const {

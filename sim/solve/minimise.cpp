@@ -22,6 +22,9 @@ constexpr int kMaxLineSearchFailures = 4;  // in a row, each with a more cautiou
 constexpr int kRawPatience = 5, kPatience = 20;
 constexpr int kMaxNegativeCurvatureExits = 10;
 constexpr double kLbfgsRefreshStep = 1e-6;  // the publication, "Non-Linear Solver"
+// A direction from a factor in single precision: Newton's to this relative residual, in at most so many solves.
+constexpr double kDirectionTolerance = 1e-7;
+constexpr int kMaxCorrections = 12;
 constexpr unsigned kNegativeCurvatureSeed = 20240229;
 
 class Minimisation {
@@ -33,7 +36,12 @@ class Minimisation {
         options_(options),
         factor_(factor),
         matrix_(matrix),
-        callback_(callback) {}
+        callback_(callback),
+        single_(
+            options.method != Minimiser::lbfgs_literal &&
+            (options.precision == FactorPrecision::mixed ||
+             (options.precision == FactorPrecision::automatic && factor.factor_flops() >= kMixedFromFlops))) {
+  }
 
   MinimiserReport run();
 
@@ -48,8 +56,14 @@ class Minimisation {
   std::optional<Status> accept(Iterate next);
   std::optional<Status> note_iteration();
   bool small() const { return report_.residual <= report_.tolerance; }
-  bool factor_raw();
-  bool factor_projected();
+  /// The factor of the raw Hessian; `final` in double precision whatever steers.
+  bool factor_raw(bool final);
+  bool factor_projected(bool full = false);
+  /// matrix_ + shift·I: in single precision while that is trusted, and in double precision where it fails. It is
+  /// no longer trusted where the other then succeeds.
+  bool factorize(double shift, bool full);
+  /// −H⁻¹ g with the factor of the raw Hessian; nothing when single precision took for definite what is not.
+  std::optional<VectorXd> raw_direction();
   /// Why factor_projected failed.
   Status no_projected_factor() const;
   /// After an accepted step of the given slope: true when steps have sunk below the energy's resolution and
@@ -64,6 +78,7 @@ class Minimisation {
   CholeskyFactor& factor_;
   BlockMatrix& matrix_;
   const IterationCallback& callback_;
+  bool single_;  ///< factors in single precision are worth trying
 
   MinimiserReport report_;
   Iterate at_;
@@ -99,25 +114,44 @@ std::optional<MinimiserStatus> Minimisation::accept(Iterate next) {
   return note_iteration();
 }
 
-bool Minimisation::factor_raw() {
+bool Minimisation::factorize(double shift, bool full) {
+  const auto attempt = [&](Precision precision) {
+    ++report_.factorisations;
+    if (precision == Precision::single) ++report_.single_factorisations;
+    const bool ok = factor_.factorize(matrix_, shift, precision);
+    if (!ok) ++report_.failed_factorisations;
+    return ok;
+  };
+  if (full || !single_) return attempt(Precision::full);
+  if (attempt(Precision::single)) return true;
+  if (!attempt(Precision::full)) return false;
+  single_ = false;
+  return true;
+}
+
+bool Minimisation::factor_raw(bool final) {
   objective_.hessian(at_.q, Curvature::raw, matrix_);
-  ++report_.factorisations;
-  const bool ok = factor_.factorize(matrix_);
-  if (!ok) ++report_.failed_factorisations;
+  const bool ok = factorize(0, final);
   report_.smallest_pivot = factor_.smallest_pivot();
   report_.largest_pivot = factor_.largest_pivot();
   return ok;
 }
 
-bool Minimisation::factor_projected() {
+bool Minimisation::factor_projected(bool full) {
   objective_.hessian(at_.q, Curvature::projected, matrix_);
   const double scale = matrix_.diagonal_max();
-  for (; shift_ <= kLargestShift; shift_ *= 10) {
-    ++report_.factorisations;
-    if (factor_.factorize(matrix_, shift_ * scale)) return true;
-    ++report_.failed_factorisations;
-  }
+  for (; shift_ <= kLargestShift; shift_ *= 10)
+    if (factorize(shift_ * scale, full)) return true;
   return false;
+}
+
+std::optional<VectorXd> Minimisation::raw_direction() {
+  if (factor_.precision() == Precision::full) return -factor_.solve(at_.gradient);
+  if (auto found = factor_.solve_iteratively(matrix_, at_.gradient, kDirectionTolerance, kMaxCorrections))
+    return -*found;
+  single_ = false;
+  if (!factorize(0, /*full=*/true)) return std::nullopt;
+  return -factor_.solve(at_.gradient);
 }
 
 MinimiserStatus Minimisation::no_projected_factor() const {
@@ -160,7 +194,7 @@ bool Minimisation::leave_along_negative_curvature(Iterate& next) {
   std::mt19937 random(kNegativeCurvatureSeed + static_cast<unsigned>(report_.negative_curvature_exits));
   std::uniform_real_distribution<double> uniform(-1, 1);
   const VectorXd r = VectorXd::NullaryExpr(at_.q.size(), [&] { return uniform(random); });
-  if (!factor_projected()) return false;
+  if (!factor_projected(/*full=*/true)) return false;
   VectorXd start = matrix_.multiply(r);
   objective_.hessian(at_.q, Curvature::raw, matrix_);
   start -= matrix_.multiply(r);
@@ -201,7 +235,7 @@ MinimiserStatus Minimisation::newton() {
   for (;;) {
     if (small() && !wants_raw) return Status::converged;
     const bool try_raw = small() || (!always_projected && projected_left == 0);
-    const bool raw = try_raw && factor_raw();
+    bool raw = try_raw && factor_raw(/*final=*/small());
     if (small()) {
       if (raw && options_.polish) polish();
       if (raw || !options_.certify_minimum) return Status::converged;
@@ -217,13 +251,18 @@ MinimiserStatus Minimisation::newton() {
       continue;
     }
     if (report_.iterations >= options_.max_iterations) return Status::max_iterations;
+    std::optional<VectorXd> newton_direction;
+    if (raw) newton_direction = raw_direction();
+    raw = newton_direction.has_value();
     if (!raw) {
       if (try_raw) projected_left = kProjectedIterations;
       if (projected_left > 0) --projected_left;
       if (!factor_projected()) return no_projected_factor();
+      // Also from single precision as it is: the projected Hessian is a model anyway.
+      newton_direction = -factor_.solve(at_.gradient);
     }
 
-    const VectorXd direction = -factor_.solve(at_.gradient);
+    const VectorXd& direction = *newton_direction;
     const double slope = at_.gradient.dot(direction), noise = energy_noise(objective_, at_);
     LineSearchResult found;
     if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
@@ -325,6 +364,18 @@ const char* name(Minimiser method) {
       return "lbfgs";
     case Minimiser::lbfgs_literal:
       return "lbfgs_literal";
+  }
+  return "unknown";
+}
+
+const char* name(FactorPrecision precision) {
+  switch (precision) {
+    case FactorPrecision::automatic:
+      return "automatic";
+    case FactorPrecision::full:
+      return "full";
+    case FactorPrecision::mixed:
+      return "mixed";
   }
   return "unknown";
 }

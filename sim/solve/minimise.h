@@ -20,12 +20,23 @@ enum class Minimiser {
   lbfgs_literal,     ///< L-BFGS to its end as published: no Newton, hence no certificate and no polish
 };
 
+/// What the factors that steer the iterations are computed in. The certificate, the polish and whatever follows them
+/// (derivatives) always have one in double precision, and so has `lbfgs_literal`.
+enum class FactorPrecision {
+  automatic,  ///< mixed for factors of kMixedFromFlops operations and more
+  full,
+  mixed,  ///< single precision, corrected by conjugate gradients with the Hessian in double precision
+};
+/// Below it assembly costs more than the factor does, and what a float factor saves is not worth its risk.
+inline constexpr double kMixedFromFlops = 2e9;
+
 struct MinimiserOptions {
   Minimiser method = Minimiser::newton;
   /// Converged when |gradient|₂ ≤ relative_tolerance · force_scale + absolute_tolerance.
   double relative_tolerance = 1e-9;
   double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;
+  FactorPrecision precision = FactorPrecision::automatic;
   int lbfgs_memory = 20;
   int lbfgs_refresh = 20;  ///< iterations between factorisations
   bool certify_minimum =
@@ -50,6 +61,7 @@ enum class MinimiserStatus {
   stagnated,  ///< the residual stays above the tolerance, yet the energy no longer resolves the steps
 };
 const char* name(Minimiser method);
+const char* name(FactorPrecision precision);
 const char* name(MinimiserStatus status);
 
 struct MinimiserReport {
@@ -59,6 +71,7 @@ struct MinimiserReport {
   int evaluations = 0;            ///< of energy and gradient
   int factorisations = 0;         ///< including the failed ones
   int failed_factorisations = 0;  ///< not positive definite
+  int single_factorisations = 0;  ///< of all, those in single precision
   int negative_curvature_exits = 0;
   double energy = 0;          ///< mJ
   double residual = 0;        ///< |gradient|₂, N
@@ -72,6 +85,7 @@ struct MinimiserReport {
     evaluations += given_up.evaluations;
     factorisations += given_up.factorisations;
     failed_factorisations += given_up.failed_factorisations;
+    single_factorisations += given_up.single_factorisations;
   }
 };
 

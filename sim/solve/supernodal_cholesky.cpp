@@ -10,16 +10,54 @@ extern "C" {
 void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
             const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
             const double* beta, double* c, const int* ldc);
+void sgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
+            const float* alpha, const float* a, const int* lda, const float* b, const int* ldb,
+            const float* beta, float* c, const int* ldc);
 void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
             const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+void ssyrk_(const char* uplo, const char* trans, const int* n, const int* k, const float* alpha,
+            const float* a, const int* lda, const float* beta, float* c, const int* ldc);
 void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
             const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void strsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
+            const int* n, const float* alpha, const float* a, const int* lda, float* b, const int* ldb);
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+void spotrf_(const char* uplo, const int* n, float* a, const int* lda, int* info);
+void dtrsv_(const char* uplo, const char* trans, const char* diag, const int* n, const double* a,
+            const int* lda, double* x, const int* incx);
+void strsv_(const char* uplo, const char* trans, const char* diag, const int* n, const float* a,
+            const int* lda, float* x, const int* incx);
+void dgemv_(const char* trans, const int* m, const int* n, const double* alpha, const double* a,
+            const int* lda, const double* x, const int* incx, const double* beta, double* y, const int* incy);
+void sgemv_(const char* trans, const int* m, const int* n, const float* alpha, const float* a, const int* lda,
+            const float* x, const int* incx, const float* beta, float* y, const int* incy);
 }
 
 namespace rhytid {
 
 namespace {
+
+/// The BLAS of a scalar type.
+template <class Real>
+struct Blas;
+template <>
+struct Blas<double> {
+  static constexpr auto gemm = dgemm_;
+  static constexpr auto syrk = dsyrk_;
+  static constexpr auto trsm = dtrsm_;
+  static constexpr auto potrf = dpotrf_;
+  static constexpr auto trsv = dtrsv_;
+  static constexpr auto gemv = dgemv_;
+};
+template <>
+struct Blas<float> {
+  static constexpr auto gemm = sgemm_;
+  static constexpr auto syrk = ssyrk_;
+  static constexpr auto trsm = strsm_;
+  static constexpr auto potrf = spotrf_;
+  static constexpr auto trsv = strsv_;
+  static constexpr auto gemv = sgemv_;
+};
 
 constexpr int kPanelWidth = 128;
 // Subtrees of at most this share of all floating-point operations are one piece of work.
@@ -30,10 +68,12 @@ constexpr int kTriangleFrom = 32;
 }  // namespace
 
 /// What a thread needs for itself.
+template <class Real>
 struct SupernodalCholesky::Workspace {
   std::vector<int> place;   ///< [size of the matrix] row → row of the panel's supernode
   std::vector<int> target;  ///< the same for the rows of a source
-  std::vector<double> product;
+  std::vector<int> runs;    ///< where target jumps
+  std::vector<Real> product;
 };
 
 /// Which panels are finished, and whether all went well so far.
@@ -157,50 +197,70 @@ void SupernodalCholesky::divide_work() {
   }
 }
 
-void SupernodalCholesky::assemble(const Panel& panel, const Matrix& a, Workspace& work) const {
+template <class Real>
+void SupernodalCholesky::assemble(const Panel& panel, const Matrix& a, Workspace<Real>& work) const {
   const int s = panel.super, n = height(s);
-  double* const x = block(s);
+  Real* const x = block<Real>(s);
   const int* const row = rows(s);
   for (int i = panel.first; i < n; ++i) work.place[row[i]] = i;
   for (int c = panel.first; c < panel.last; ++c) {
-    double* const column = x + static_cast<std::ptrdiff_t>(c) * n;
-    std::fill(column + panel.first, column + n, 0.0);
+    Real* const column = x + static_cast<std::ptrdiff_t>(c) * n;
+    std::fill(column + panel.first, column + n, Real(0));
     const int j = super_[s] + c;
+    // The diagonal entry is the first of its column.
     for (int e = a.column_start[j]; e < a.column_start[j + 1]; ++e)
-      column[work.place[a.rows[e]]] = a.values[e];
-    column[c] += a.shift;
+      column[work.place[a.rows[e]]] = static_cast<Real>(a.values[e]);
+    column[c] = static_cast<Real>(a.values[a.column_start[j]] + a.shift);
   }
 }
 
-void SupernodalCholesky::subtract_source(const Panel& panel, const Source& source, Workspace& work) const {
+template <class Real>
+void SupernodalCholesky::subtract_source(const Panel& panel, const Source& source,
+                                         Workspace<Real>& work) const {
   const int d = source.super, k = width(d), ld = height(d);
   const int columns = source.row_end - source.row_begin, rows_left = ld - source.row_begin;
-  const double* const from = block(d) + source.row_begin;
-  double* const product = work.product.data();
-  const double one = 1, zero = 0;
+  const Real* const from = block<Real>(d) + source.row_begin;
+  Real* const product = work.product.data();
+  const Real one = 1, zero = 0;
   if (columns < kTriangleFrom) {
-    dgemm_("N", "T", &rows_left, &columns, &k, &one, from, &ld, from, &ld, &zero, product, &rows_left);
+    Blas<Real>::gemm("N", "T", &rows_left, &columns, &k, &one, from, &ld, from, &ld, &zero, product,
+                     &rows_left);
   } else {
-    dsyrk_("L", "N", &columns, &k, &one, from, &ld, &zero, product, &rows_left);
+    Blas<Real>::syrk("L", "N", &columns, &k, &one, from, &ld, &zero, product, &rows_left);
     const int below = rows_left - columns;
     if (below > 0)
-      dgemm_("N", "T", &below, &columns, &k, &one, from + columns, &ld, from, &ld, &zero, product + columns,
-             &rows_left);
+      Blas<Real>::gemm("N", "T", &below, &columns, &k, &one, from + columns, &ld, from, &ld, &zero,
+                       product + columns, &rows_left);
   }
+  // Rows come in runs that also follow each other in the panel: at least the components of a node, mostly a
+  // column of nodes through the skin and its neighbours.
   const int* const row = rows(d) + source.row_begin;
   int* const target = work.target.data();
-  for (int i = 0; i < rows_left; ++i) target[i] = work.place[row[i]];
+  work.runs.clear();
+  for (int i = 0; i < rows_left; ++i) {
+    target[i] = work.place[row[i]];
+    if (i == 0 || target[i] != target[i - 1] + 1) work.runs.push_back(i);
+  }
+  work.runs.push_back(rows_left);
   const int s = panel.super, n = height(s);
-  double* const x = block(s);
+  Real* const x = block<Real>(s);
+  std::size_t first_run = 0;  // with rows at or below the diagonal of column j
   for (int j = 0; j < columns; ++j) {
-    double* const column = x + static_cast<std::ptrdiff_t>(target[j]) * n;
-    const double* const p = product + static_cast<std::ptrdiff_t>(j) * rows_left;
-    for (int i = j; i < rows_left; ++i) column[target[i]] -= p[i];
+    Real* const column = x + static_cast<std::ptrdiff_t>(target[j]) * n;
+    const Real* const p = product + static_cast<std::ptrdiff_t>(j) * rows_left;
+    while (work.runs[first_run + 1] <= j) ++first_run;
+    for (std::size_t r = first_run; r + 1 < work.runs.size(); ++r) {
+      const int begin = std::max(work.runs[r], j), count = work.runs[r + 1] - begin;
+      Real* const to = column + target[begin];
+      const Real* const subtracted = p + begin;
+      for (int i = 0; i < count; ++i) to[i] -= subtracted[i];
+    }
   }
 }
 
+template <class Real>
 bool SupernodalCholesky::compute(int index, const Matrix& a, const Progress& progress,
-                                 Workspace& work) const {
+                                 Workspace<Real>& work) const {
   const Panel& panel = panels_[static_cast<std::size_t>(index)];
   const int s = panel.super, n = height(s), columns = panel.last - panel.first;
   assemble(panel, a, work);
@@ -209,32 +269,33 @@ bool SupernodalCholesky::compute(int index, const Matrix& a, const Progress& pro
     if (progress.failed()) return false;
     subtract_source(panel, sources_[k], work);
   }
-  const auto at = [&](int i, int j) { return block(s) + static_cast<std::ptrdiff_t>(j) * n + i; };
-  const double one = 1, minus_one = -1;
+  const auto at = [&](int i, int j) { return block<Real>(s) + static_cast<std::ptrdiff_t>(j) * n + i; };
+  const Real one = 1, minus_one = -1;
   const int rows_left = n - panel.first, below = n - panel.last;
   for (int e = first_panel_[s]; e < index; ++e) {
     const int first = panels_[static_cast<std::size_t>(e)].first, k = kPanelWidth;
     progress.wait_for(e);
     if (progress.failed()) return false;
-    dgemm_("N", "T", &rows_left, &columns, &k, &minus_one, at(panel.first, first), &n, at(panel.first, first),
-           &n, &one, at(panel.first, panel.first), &n);
+    Blas<Real>::gemm("N", "T", &rows_left, &columns, &k, &minus_one, at(panel.first, first), &n,
+                     at(panel.first, first), &n, &one, at(panel.first, panel.first), &n);
   }
   int info = 0;
-  dpotrf_("L", &columns, at(panel.first, panel.first), &n, &info);
+  Blas<Real>::potrf("L", &columns, at(panel.first, panel.first), &n, &info);
   if (info != 0) return false;
   if (below > 0)
-    dtrsm_("R", "L", "T", "N", &below, &columns, &one, at(panel.first, panel.first), &n,
-           at(panel.last, panel.first), &n);
+    Blas<Real>::trsm("R", "L", "T", "N", &below, &columns, &one, at(panel.first, panel.first), &n,
+                     at(panel.last, panel.first), &n);
   return true;
 }
 
+template <class Real>
 bool SupernodalCholesky::factorize(const int* column_start, const int* rows, const double* values,
                                    double shift, int threads) {
   const Matrix a{column_start, rows, values, shift};
   Progress progress(panels_.size());
   const int pieces = static_cast<int>(piece_start_.size()) - 1;
   parallel_for(threads, [&](std::int64_t) {
-    Workspace work;
+    Workspace<Real> work;
     std::exception_ptr failure;
     for (int piece = progress.next_piece(); piece < pieces; piece = progress.next_piece())
       for (int k = piece_start_[piece]; k < piece_start_[piece + 1]; ++k) {
@@ -257,5 +318,40 @@ bool SupernodalCholesky::factorize(const int* column_start, const int* rows, con
   });
   return !progress.failed();
 }
+
+template <class Real>
+void SupernodalCholesky::solve(Real* x) const {
+  std::vector<Real> below(static_cast<std::size_t>(largest_height_));
+  const int step = 1;
+  const Real one = 1, zero = 0;
+  // A supernode's rows below its own columns, gathered from x or scattered into it.
+  for (int s = 0; s < num_super_; ++s) {
+    const int n = height(s), columns = width(s), left = n - columns;
+    const Real* const l = block<Real>(s);
+    Blas<Real>::trsv("L", "N", "N", &columns, l, &n, x + super_[s], &step);
+    if (left == 0) continue;
+    Blas<Real>::gemv("N", &left, &columns, &one, l + columns, &n, x + super_[s], &step, &zero, below.data(),
+                     &step);
+    const int* const row = rows(s) + columns;
+    for (int i = 0; i < left; ++i) x[row[i]] -= below[static_cast<std::size_t>(i)];
+  }
+  const Real minus_one = -1;
+  for (int s = num_super_ - 1; s >= 0; --s) {
+    const int n = height(s), columns = width(s), left = n - columns;
+    const Real* const l = block<Real>(s);
+    if (left > 0) {
+      const int* const row = rows(s) + columns;
+      for (int i = 0; i < left; ++i) below[static_cast<std::size_t>(i)] = x[row[i]];
+      Blas<Real>::gemv("T", &left, &columns, &minus_one, l + columns, &n, below.data(), &step, &one,
+                       x + super_[s], &step);
+    }
+    Blas<Real>::trsv("L", "T", "N", &columns, l, &n, x + super_[s], &step);
+  }
+}
+
+template bool SupernodalCholesky::factorize<double>(const int*, const int*, const double*, double, int);
+template bool SupernodalCholesky::factorize<float>(const int*, const int*, const double*, double, int);
+template void SupernodalCholesky::solve<double>(double*) const;
+template void SupernodalCholesky::solve<float>(float*) const;
 
 }  // namespace rhytid

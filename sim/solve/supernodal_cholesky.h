@@ -1,5 +1,6 @@
-// The numbers of a supernodal Cholesky factor, computed on several threads with the same bits for any number
-// of them. CHOLMOD supplies the structure (supernodes, rows, storage) and solves with the result.
+// The numbers of a supernodal Cholesky factor in double or single precision, computed on several threads with
+// the same bits for any number of them. CHOLMOD supplies the structure (supernodes, rows, storage) and solves with
+// those in double precision; those in single precision, which CHOLMOD 3 does not know, are solved with here.
 //
 //   panel P of supernode s: columns J of L, rows i ≥ J
 //   L(i, P) = A(i, P) − Σ_d L(i, d) L(J, d)ᵀ − Σ_e L(i, e) L(J, e)ᵀ   d earlier supernodes, e earlier panels of s
@@ -26,10 +27,24 @@ class SupernodalCholesky {
   explicit SupernodalCholesky(cholmod_factor& factor);
 
   /// Overwrites the factor's values with those of A + shift·I, A the lower triangle by columns in the factor's
-  /// order. False when a pivot is not positive (the values are then meaningless); a NaN may pass. The BLAS must
+  /// order. Real is double or float; floats take the first half of the same storage, which CHOLMOD must not read
+  /// then. False when a pivot is not positive (the values are then meaningless); a NaN may pass. The BLAS must
   /// be on one thread per call, and, with several `threads`, safe to call from several at once.
+  template <class Real>
   [[nodiscard]] bool factorize(const int* column_start, const int* rows, const double* values, double shift,
                                int threads);
+
+  /// x [size of the matrix], in the factor's order: L Lᵀ x = b, b overwritten; L as factorize<Real> left it.
+  template <class Real>
+  void solve(Real* x) const;
+
+  /// Calls visit(pivot) with every diagonal entry of L.
+  template <class Real, class Visit>
+  void for_diagonal(Visit&& visit) const {
+    for (int s = 0; s < num_super_; ++s)
+      for (int c = 0; c < width(s); ++c)
+        visit(block<Real>(s)[static_cast<std::ptrdiff_t>(c) * (height(s) + 1)]);
+  }
 
  private:
   struct Panel {
@@ -40,6 +55,7 @@ class SupernodalCholesky {
   struct Source {
     int super, row_begin, row_end;
   };
+  template <class Real>
   struct Workspace;
   struct Matrix {
     const int* column_start;
@@ -52,12 +68,18 @@ class SupernodalCholesky {
   int width(int s) const { return super_[s + 1] - super_[s]; }
   int height(int s) const { return row_start_[s + 1] - row_start_[s]; }
   const int* rows(int s) const { return rows_ + row_start_[s]; }
-  double* block(int s) const { return static_cast<double*>(factor_->x) + value_start_[s]; }
+  template <class Real>
+  Real* block(int s) const {
+    return static_cast<Real*>(factor_->x) + value_start_[s];
+  }
   void find_sources();
   void divide_work();
-  bool compute(int panel, const Matrix& a, const Progress& progress, Workspace& work) const;
-  void assemble(const Panel& panel, const Matrix& a, Workspace& work) const;
-  void subtract_source(const Panel& panel, const Source& source, Workspace& work) const;
+  template <class Real>
+  bool compute(int panel, const Matrix& a, const Progress& progress, Workspace<Real>& work) const;
+  template <class Real>
+  void assemble(const Panel& panel, const Matrix& a, Workspace<Real>& work) const;
+  template <class Real>
+  void subtract_source(const Panel& panel, const Source& source, Workspace<Real>& work) const;
 
   cholmod_factor* factor_;
   const int *super_, *row_start_, *value_start_, *rows_;

@@ -43,7 +43,7 @@ inline constexpr const char* full_scene = R"({
   ],
   "time": {"frame_rate": "24 Hz", "frames": 12, "substeps": 2, "max_bisections": 3, "damper": "strang"},
   "solver": {"minimiser": "lbfgs", "relative_tolerance": 1e-8, "absolute_tolerance": "1 uN", "max_iterations": 50,
-             "lbfgs_memory": 10, "lbfgs_refresh": 50},
+             "lbfgs_memory": 10, "lbfgs_refresh": 50, "factor_precision": "full"},
   "output": {"vtu": false, "pictures": true, "csv": false, "every": 2}
 })";
 

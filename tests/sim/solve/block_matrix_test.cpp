@@ -104,6 +104,40 @@ TEST_P(BlockMatrixTest, AssemblesFactorisesAndSolvesLikeDense) {
   EXPECT_LE((shifted * factor.solve(rhs) - rhs).norm(), 1e-12 * rhs.norm());
 }
 
+TEST_P(BlockMatrixTest, SinglePrecisionIsAPreconditioner) {
+  const auto [n, size, with_dropped] = GetParam();
+  const RandomProblem problem(n, size, 13 * n + size, with_dropped);
+  const BlockPattern pattern(n, problem.cliques);
+  BlockMatrix matrix(pattern);
+  problem.assemble(matrix);
+  CholeskyFactor factor(pattern), full(pattern);
+  ASSERT_TRUE(factor.factorize(matrix, 0, Precision::single));
+  EXPECT_EQ(factor.precision(), Precision::single);
+  ASSERT_TRUE(full.factorize(matrix));
+  EXPECT_EQ(full.precision(), Precision::full);
+  EXPECT_NEAR(factor.smallest_pivot(), full.smallest_pivot(), 1e-3 * full.smallest_pivot());
+  EXPECT_NE(factor.smallest_pivot(), full.smallest_pivot());
+
+  // Far from 1, where a float would overflow.
+  const MatrixXd rhs = 1e60 * random_matrix(3 * n, 2, 3);
+  const VectorXd eigenvalues = problem.full.selfadjointView<Eigen::Lower>().eigenvalues();
+  const double condition = eigenvalues.maxCoeff() / eigenvalues.minCoeff();
+  const MatrixXd expected = problem.full.ldlt().solve(rhs), alone = factor.solve(rhs);
+  EXPECT_LE((alone - expected).norm(), 1e-6 * condition * expected.norm());
+  EXPECT_GT((alone - expected).norm(), 1e-10 * expected.norm()) << "not in single precision";
+  EXPECT_EQ(factor.solve(MatrixXd::Zero(3 * n, 1)).norm(), 0);
+  const auto corrected = factor.solve_iteratively(matrix, rhs.col(1), 1e-12, 20);
+  ASSERT_TRUE(corrected.has_value());
+  EXPECT_LE((problem.full * *corrected - rhs.col(1)).norm(), 2e-12 * rhs.col(1).norm());
+  EXPECT_FALSE(factor.solve_iteratively(matrix, rhs.col(1), 1e-12, 1).has_value()) << "one solve cannot do";
+
+  // The same storage serves both precisions in turn.
+  ASSERT_TRUE(factor.factorize(matrix));
+  EXPECT_EQ(factor.solve(rhs), full.solve(rhs));
+  EXPECT_FALSE(factor.factorize(matrix, -1.01 * eigenvalues.maxCoeff(), Precision::single));
+  EXPECT_FALSE(factor.usable());
+}
+
 TEST_P(BlockMatrixTest, FixMakesIdentityRows) {
   const auto [n, size, with_dropped] = GetParam();
   const RandomProblem problem(n, size, 11 * n + size, with_dropped);

@@ -112,6 +112,63 @@ TEST(Minimise, RawHessianConvergesQuadratically) {
   EXPECT_LT(r.end()[-1], 1e-3 * r.end()[-2]);
 }
 
+TEST(Minimise, SinglePrecisionSteersToTheSameMinimum) {
+  for (const Minimiser method : kAll) {
+    RosenbrockChain objective(12);
+    MinimiserOptions options;
+    options.method = method;
+    options.max_iterations = 3000;
+    const VectorXd start = random_vector(36, 0, 0.9);
+    const auto [full, expected, full_factor, full_matrix] = solve(objective, start, options);
+    EXPECT_EQ(full.single_factorisations, 0) << "a small factor is worth no risk";
+    options.precision = FactorPrecision::mixed;
+    const auto [mixed, q, factor, matrix] = solve(objective, start, options);
+    ASSERT_TRUE(mixed.converged()) << name(method) << ": " << name(mixed.status);
+    EXPECT_GT(mixed.single_factorisations, mixed.factorisations / 2) << name(method);
+    EXPECT_LT(mixed.single_factorisations, mixed.factorisations) << "the certificate is in double precision";
+    EXPECT_EQ(factor.precision(), Precision::full);
+    EXPECT_EQ(mixed.smallest_pivot, factor.smallest_pivot());
+    EXPECT_LE((q - expected).norm(), 1e-7 * expected.norm()) << name(method);
+    EXPECT_LE(mixed.iterations, full.iterations + full.iterations / 4 + 2) << name(method);
+  }
+}
+
+/// A chain whose condition number is beyond single precision: a stiff mode beside soft ones.
+class IllConditionedChain final : public QuadraticChain {
+ public:
+  explicit IllConditionedChain(int n) : QuadraticChain(n) {
+    // Springs between neighbours, nearly nothing to the ground: smooth displacements are soft by 1e-9.
+    for (int i = 0; i + 1 < n; ++i) {
+      a[static_cast<std::size_t>(i)].setZero();
+      b[static_cast<std::size_t>(i)].setZero();
+      for (int k = 0; k < 3; ++k) {
+        Matrix6& piece = a[static_cast<std::size_t>(i)];
+        piece(k, k) = piece(k + 3, k + 3) = 1 + 1e-9;
+        piece(k, k + 3) = piece(k + 3, k) = -1;
+      }
+    }
+  }
+};
+
+TEST(Minimise, DoublePrecisionTakesOverWhereSingleFails) {
+  IllConditionedChain objective(40);
+  MinimiserOptions options;
+  options.absolute_tolerance = 1e-6;
+  options.precision = FactorPrecision::mixed;
+  const auto [report, q, factor, matrix] = solve(objective, random_vector(120, -1, 1), options);
+  EXPECT_TRUE(report.converged()) << name(report.status);
+  EXPECT_EQ(report.single_factorisations, 1) << "what has failed once is not tried again";
+  EXPECT_LE(report.iterations, 4);
+}
+
+TEST(Minimise, LiteralLbfgsKeepsDoublePrecision) {
+  RosenbrockChain objective(12);
+  MinimiserOptions options = published_minimiser();
+  options.precision = FactorPrecision::mixed;
+  options.max_iterations = 3000;
+  EXPECT_EQ(solve(objective, random_vector(36, 0.8, 1.2), options).report.single_factorisations, 0);
+}
+
 TEST(Minimise, LeavesAnExactSaddle) {
   for (const Minimiser method : kAll) {
     DoubleWellChain objective(20);
