@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "sim/scene/names.h"
 
@@ -19,13 +20,20 @@ const char* limit_sign(LimitKind kind) {
   return kind == LimitKind::at_most ? "<=" : kind == LimitKind::at_least ? ">=" : "near";
 }
 
+const char* verdict_word(Verdict verdict) {
+  return verdict == Verdict::pass ? "pass" : verdict == Verdict::warning ? "warning" : "fail";
+}
+
 }  // namespace
 
+std::string certificate_verdict(bool passed, bool interrupted) {
+  return interrupted ? "The certificate was interrupted; what follows is what had been done."
+         : passed    ? "The gradient of this scene is certified: every check passed."
+                     : "The gradient of this scene is NOT certified: a check failed.";
+}
+
 std::string certificate_text(const CertificateReport& r) {
-  std::string out;
-  out += r.interrupted ? "The certificate was interrupted; what follows is what had been done.\n"
-         : r.passed()  ? "The gradient of this scene is certified: every check passed.\n"
-                       : "The gradient of this scene is NOT certified: a check failed.\n";
+  std::string out = certificate_verdict(r.passed(), r.interrupted) + "\n";
   out += "\nverdict  check                                                  figure      limit\n";
   for (const CertificateCheck& c : r.checks) {
     out += line("%-8s %-52s %9.4g  %s %.4g", name(c.verdict), c.name.c_str(), c.figure, limit_sign(c.limit),
@@ -72,9 +80,7 @@ nlohmann::json certificate_json(const CertificateReport& r) {
                            {"figure", c.figure},
                            {"limit", c.threshold},
                            {"passes_when", limit_sign(c.limit)},
-                           {"verdict", c.verdict == Verdict::pass      ? "pass"
-                                       : c.verdict == Verdict::warning ? "warning"
-                                                                       : "fail"},
+                           {"verdict", verdict_word(c.verdict)},
                            {"sentence", c.sentence}});
   for (const TaylorSeries& s : r.taylor)
     j["taylor"].push_back({{"group", s.group},
@@ -99,7 +105,8 @@ nlohmann::json certificate_json(const CertificateReport& r) {
   j["steps"] = {{"time", r.step_times},
                 {"smallest_pivot", r.steps.smallest_pivot},
                 {"largest_pivot", r.steps.largest_pivot},
-                {"residual", r.steps.residual}};
+                {"residual", r.steps.residual},
+                {"regime_changes", r.steps.regime_changes}};
   j["noise"] = r.noise;
   j["error_bar"] = r.error_bar;
   j["seconds"] = {{"forward", r.forward_seconds},
@@ -107,6 +114,23 @@ nlohmann::json certificate_json(const CertificateReport& r) {
                   {"adjoint", r.adjoint_seconds},
                   {"certificate", r.total_seconds}};
   return j;
+}
+
+std::vector<CertificateCheck> certificate_checks(const nlohmann::json& certificate) {
+  std::vector<CertificateCheck> checks;
+  for (const nlohmann::json& j : certificate.at("checks")) {
+    const auto number = [&j](const char* key) {
+      return j.at(key).is_null() ? std::numeric_limits<double>::quiet_NaN() : j.at(key).get<double>();
+    };
+    CertificateCheck check{j.at("name").get<std::string>(), number("figure"), number("limit"), Verdict::fail,
+                           j.at("sentence").get<std::string>()};
+    for (const Verdict verdict : {Verdict::pass, Verdict::warning})
+      if (j.at("verdict") == verdict_word(verdict)) check.verdict = verdict;
+    for (const LimitKind kind : {LimitKind::at_least, LimitKind::near})
+      if (j.at("passes_when") == limit_sign(kind)) check.limit = kind;
+    checks.push_back(std::move(check));
+  }
+  return checks;
 }
 
 }  // namespace rhytid::adjoint

@@ -4,8 +4,10 @@
 #include <ostream>
 
 #include "adjoint/certificate_report.h"
+#include "sim/core/build_info.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "tools/certificate_page.h"
 #include "tools/polished_run.h"
 #include "tools/scene_argument.h"
 #include "tools/verb.h"
@@ -28,7 +30,7 @@ class Certify : public Verb {
         "parameter on "
         "its own as well.",
         "scene.json and what it names",
-        "certificate.txt, certificate.json; prints the same text",
+        "certificate.html (the page), certificate.txt, certificate.json; prints the text",
         "rhytid certify data/scenes/bent_patch/scene.json -o run/certificate --thorough"};
   }
   void add_options(CLI::App& app) override {
@@ -77,13 +79,31 @@ class Certify : public Verb {
     progress.finish();
     const std::string text = adjoint::certificate_text(report);
     write_file(folder + "/certificate.txt", text);
-    write_file(folder + "/certificate.json", adjoint::certificate_json(report).dump(1) + "\n");
+    nlohmann::json json = adjoint::certificate_json(report);
+    json["scene"] = scene_model.scene().file;
+    json["functional_points"] = points_;
+    json["seed"] = seed_;
+    json["version"] = build_info().version;
+    write_file(folder + "/certificate.json", json.dump(1) + "\n");
+    write_file(folder + "/certificate.html",
+               certificate_page(report, scene_model, {points_, seed_, command(context)}));
     context.out << text;
     if (report.interrupted) return ExitCode::interrupted;
     return report.passed() ? ExitCode::ok : ExitCode::not_converged;
   }
 
  private:
+  std::vector<std::string> command(const VerbContext& context) const {
+    std::vector<std::string> words = {context.program.name, "certify", context.options.file};
+    for (const std::string& setting : context.options.settings) words.insert(words.end(), {"--set", setting});
+    std::string addresses;
+    for (const std::string& address : addresses_) addresses += (addresses.empty() ? "" : ",") + address;
+    if (!addresses.empty()) words.insert(words.end(), {"--parameters", addresses});
+    if (thorough_) words.emplace_back("--thorough");
+    words.insert(words.end(), {"--seed", std::to_string(seed_), "--points", std::to_string(points_)});
+    return words;
+  }
+
   std::vector<std::string> addresses_;
   bool thorough_ = false;
   unsigned seed_ = 1;

@@ -37,6 +37,10 @@ std::string fixed_text(double value, int decimals) {
   return text;
 }
 
+std::string counted(long count, const std::string& noun) {
+  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
 std::string xml_escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {

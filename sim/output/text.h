@@ -16,6 +16,9 @@ std::string short_text(double value, int digits = 4);
 /// Text with `decimals` digits after the point.
 std::string fixed_text(double value, int decimals);
 
+/// "3 frames", "1 frame": the count with its noun in the right number.
+std::string counted(long count, const std::string& noun);
+
 /// Escapes & < > " ' for XML, SVG and HTML.
 std::string xml_escaped(std::string_view text);
 

@@ -44,9 +44,11 @@ grep -q '"passed": true' "$folder/a/certificate.json" || { echo "FAILED: certifi
 grep -qE '^pass +Taylor slope, joint, random +(1\.9[5-9][0-9]*|2|2\.0[0-9]*) +near 2$' "$folder/out" || { echo "FAILED: slope"; cat "$folder/out"; failures=$((failures + 1)); }
 grep -qE '^pass +pivots +[0-9.]+ +>= 0\.1$' "$folder/out" || { echo "FAILED: pivots"; failures=$((failures + 1)); }
 grep -q 'Taylor slope, soft youngs_modulus' "$folder/out" || { echo "FAILED: --thorough"; failures=$((failures + 1)); }
+grep -q '>certified' "$folder/a/certificate.html" || { echo "FAILED: certificate.html"; failures=$((failures + 1)); }
 # No viscosity: its time has no effect, so there is nothing to certify.
 expect 3 "$folder/scene.json" -o "$folder/b" --set /skin/layers/soft/relaxing_fraction=0 \
   --parameters /skin/layers/soft/relaxation_time
+grep -q '>FAIL<' "$folder/b/certificate.html" || { echo "FAILED: certificate.html of a failed check"; failures=$((failures + 1)); }
 # The step is not solved within one iteration: no run, no gradient.
 expect 3 "$folder/scene.json" -o "$folder/c" --set /solver/max_iterations=1 --set /time/max_bisections=0
 expect 2 "$folder/scene.json" -o "$folder/d" --parameters /skin/layers/soft/youngs_modulos

@@ -31,6 +31,9 @@ void add_convergence(HtmlPage& page, const ReportData& data);
 /// Singular values, correlations, the weakest combination.
 void add_identifiability(HtmlPage& page, const ReportData& data);
 
+/// The checks of certificate.json, where the folder has one.
+void add_certificate(HtmlPage& page, ReportData& data);
+
 /// Versions, schemes, counts, timings, files, commands.
 void add_run_facts(HtmlPage& page, const ReportData& data);
 

@@ -69,8 +69,4 @@ std::optional<bool> truth_inside(const std::optional<double>& truth, double low,
   return low <= *truth && *truth <= high;
 }
 
-std::string counted(long count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
-}
-
 }  // namespace rhytid::tools

@@ -32,7 +32,4 @@ std::string estimate_text(const fitting::DerivedQuantity& d);
 /// Whether a known truth lies in the interval; nothing when it is not known or there is no interval.
 std::optional<bool> truth_inside(const std::optional<double>& truth, double low, double high);
 
-/// "frames 3" / "1 frame": the count with its noun in the right number.
-std::string counted(long count, const std::string& noun);
-
 }  // namespace rhytid::tools

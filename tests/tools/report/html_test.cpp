@@ -8,6 +8,7 @@
 
 #include "sim/core/error.h"
 #include "sim/output/plot.h"
+#include "sim/output/text.h"
 #include "tests/tools/report/html_checker.h"
 #include "tools/report/wording.h"
 

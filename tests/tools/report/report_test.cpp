@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "adjoint/certificate_report.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
 #include "sim/scene/parameter.h"
@@ -156,6 +157,22 @@ TEST(Report, ShowsTheSceneThatWasFitted) {
   EXPECT_EQ(get_parameter(data.model->scene(), "/skin/layers/film/youngs_modulus"), 1.013);
   EXPECT_THAT(read_file(report(folder, false).path),
               HasSubstr("--set /settings/0=/skin/layers/soft/poissons_ratio=0.31"));
+}
+
+TEST(Report, ShowsACertificateThatIsThere) {
+  const std::string folder = folder_for("certificate");
+  test::write_synthetic_fit(folder, 1);
+  EXPECT_THAT(read_file(report(folder, false).path), Not(HasSubstr("Gradient certificate")));
+  adjoint::CertificateReport certificate;
+  certificate.checks = {{"duality", 1, 1e-11, adjoint::Verdict::fail, "one of them is wrong"}};
+  write_file(folder + "/certificate.json", adjoint::certificate_json(certificate).dump());
+  const std::string page = read_file(report(folder, false).path);
+  EXPECT_EQ(test::html_complaint(page), "");
+  EXPECT_THAT(page, HasSubstr("Gradient certificate"));
+  EXPECT_THAT(page, HasSubstr(">FAIL</td><td>1</td>"));
+  write_file(folder + "/certificate.json", "{\"checks\": 3}");
+  EXPECT_THAT(read_file(report(folder, false).path),
+              HasSubstr("certificate.json is not what certify writes"));
 }
 
 TEST(Report, FindsFilesAfterTheFolderMoved) {
