@@ -147,7 +147,7 @@ void check_setting(const std::string& text, const std::string& where) {
 std::string name_of_file(const std::string& file) {
   const std::filesystem::path path(file);
   std::filesystem::path name = path.stem();
-  if (name == "scene" || name == "case" || name == "experiment") {
+  if (name == "scene" || name == "case" || name == "experiment" || name == "pareto") {
     const auto parent = std::filesystem::absolute(path).lexically_normal().parent_path().filename();
     if (!parent.empty()) name = parent;
   }

@@ -27,6 +27,8 @@ struct PlotSeries {
   PlotStyle style = PlotStyle::line;
   bool dashed = false;
   std::optional<Rgb> colour;  ///< default: the next of the palette
+  /// Written beside the points, same size or empty.
+  std::vector<std::string> names = {};
 };
 
 /// A straight line across a line plot, e.g. a threshold or the truth.

@@ -40,6 +40,9 @@ class LinePainter {
       if (!series.error.empty()) draw_error(x_.pixel(series.x[i]), series.y[i], series.error[i], colour);
       if (series.style != PlotStyle::line && y_.shows(series.y[i])) {
         canvas_.circle(x_.pixel(series.x[i]), y_.pixel(series.y[i]), 3, "fill=\"" + colour + "\"");
+        if (!series.names.empty())
+          canvas_.text(x_.pixel(series.x[i]) + 5, y_.pixel(series.y[i]) - 4, series.names[i], "start",
+                       "fill=\"" + colour + "\" font-size=\"10\"");
       }
     }
   }
@@ -135,8 +138,9 @@ std::string svg(const LinePlot& plot) {
   double legend_width = 0;
   for (const PlotSeries& series : plot.series) {
     require(series.x.size() == series.y.size() &&
-                (series.error.empty() || series.error.size() == series.x.size()),
-            "plot: x, y and error must have the same size");
+                (series.error.empty() || series.error.size() == series.x.size()) &&
+                (series.names.empty() || series.names.size() == series.x.size()),
+            "plot: x, y, errors and names must have the same size");
     colours.push_back(hex_colour(series.colour.value_or(palette_colour(colours.size()))));
     for (size_t i = 0; i < series.x.size(); ++i) {
       if (!std::isfinite(series.x[i]) || !std::isfinite(series.y[i])) continue;

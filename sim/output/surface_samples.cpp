@@ -70,6 +70,7 @@ void SurfaceSamples::place(const SkinMesh& mesh, const std::vector<Vec3>& wanted
     const double sideways = (way - way.dot(point.normal) * point.normal).norm();
     const bool beside = sideways > 0.5 * nominal && sideways > 0.25 * way.norm();
     if (beside) point.nodes.clear(), ++missing_;
+    places_.push_back(beside ? Place{} : Place{face, u, v});
     found.push_back(beside ? Vec3::Constant(std::numeric_limits<double>::quiet_NaN()) : at.point);
     points_.push_back(std::move(point));
   }

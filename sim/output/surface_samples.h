@@ -35,6 +35,13 @@ class SurfaceSamples {
   double spacing() const { return spacing_; }
   /// Number of points that lie beside the surface.
   int missing() const { return missing_; }
+  /// Where a point is: natural coordinates u, v on a face of the outer surface; face −1 beside it.
+  struct Place {
+    int face = -1;
+    double u = 0, v = 0;
+  };
+  /// Of all points, the first axis fastest.
+  const std::vector<Place>& places() const { return places_; }
   /// Displacement along the smoothed rest normals, mm, [rows][columns]; NaN beside the surface.
   /// `displacement` [num_nodes·3].
   MatrixXd heights(const VectorXd& displacement) const;
@@ -53,6 +60,7 @@ class SurfaceSamples {
     Vec3 normal;
   };
   std::vector<Point> points_;
+  std::vector<Place> places_;
 };
 
 }  // namespace rhytid

@@ -56,6 +56,38 @@ expect 0 minimisers --scene "$folder/stages/patch_600.json" --frames 2 --minimis
 expect 0 minimisers --scene "$folder/stages/patch_600.json" --frames 2 --minimisers newton -o "$folder/first"
 [ "$(column "$folder/first/minimisers.csv" frames)" = 2 ] || fail "the first frames of a scene"
 
+# Errors against run time: looser is worse, an empty group of parameters has no gradient, what is finished is kept.
+cat >"$folder/pareto.json" <<'END'
+{"scene": "stages/patch_600.json", "settings": ["/time/frames=3", "/skin/order=1"],
+ "measure": {"line": {"from": [-10, 0, 0], "to": [10, 0, 0], "points": 60}},
+ "compare": {"window": {"centre": [0, 0, 0], "size": [20, 10], "spacing": "2 mm"},
+             "parameters": ["/skin/layers/film/youngs_modulus", "/ligaments/sources/left/strength"],
+             "groups": [{"name": "solver", "reference": "tight", "variants": ["loose", "fair", "stopped"]}]},
+ "variants": [{"name": "tight", "settings": ["/solver/relative_tolerance=1e-12"]},
+              {"name": "loose", "settings": ["/solver/relative_tolerance=0.1"]},
+              {"name": "fair", "settings": ["/solver/relative_tolerance=1e-3"]},
+              {"name": "stopped", "settings": ["/solver/max_iterations=1", "/time/max_bisections=0"]},
+              {"name": "not_compared", "settings": []}]}
+END
+expect 0 pareto "$folder/pareto.json" -o "$folder/pareto"
+for measure in displacement force gradient; do
+  awk -F, -v name="${measure}_relative_error" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i; next }
+    { e[$2] = $c } END { exit !(e["fair"] > 0 && e["fair"] < 0.1 * e["loose"] && e["loose"] < 1) }' "$folder/pareto/pareto.csv" ||
+    fail "errors of $measure"
+  grep -q '>fair</text>' "$folder/pareto/solver_$measure.svg" || fail "plot of $measure"
+done
+grep -q '^solver,stopped,not_converged,' "$folder/pareto/pareto.csv" || fail "a run that fails is a row"
+grep -q '^solver,tight,reference,' "$folder/pareto/pareto.csv" || fail "the reference is a row"
+[ -e "$folder/pareto/runs/not_compared" ] && fail "what is not compared was run"
+cp "$folder/pareto/pareto.csv" "$folder/before.csv"
+expect 0 pareto "$folder/pareto.json" -o "$folder/pareto"
+cmp -s "$folder/before.csv" "$folder/pareto/pareto.csv" || fail "kept results give another table"
+grep -q 'fair: complete before, kept' "$folder/err" || fail "a finished variant ran again"
+expect 0 pareto "$folder/pareto.json" --set /time/frames=2 -o "$folder/pareto"
+grep -q 'kept' "$folder/err" && fail "a variant with other settings was kept"
+sed -i 's/"reference": "tight"/"reference": "best"/' "$folder/pareto.json"
+expect 2 pareto "$folder/pareto.json" -o "$folder/x"
+
 # A scene of the user's, and what is refused.
 expect 0 gradient --scene "$folder/stages/patch_600.json" --set /time/frames=1 --repeats 1 --parameters 1 -o "$folder/own"
 expect 2 gradient --scene "$folder/none.json" -o "$folder/x"

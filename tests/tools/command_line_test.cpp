@@ -198,6 +198,7 @@ TEST(CommandLine, a_second_interrupt_ends_the_process) {
 TEST(CommandLine, output_folder_defaults_to_the_scene_and_must_be_a_folder) {
   EXPECT_EQ(default_output("data/scenes/demo/case.json"), "run/demo");
   EXPECT_EQ(default_output("data/scenes/viscous_drag/experiment.json"), "run/viscous_drag");
+  EXPECT_EQ(default_output("data/scenes/viscous_drag/pareto.json"), "run/viscous_drag");
   EXPECT_EQ(default_output("data/sphere.json"), "run/sphere");
   EXPECT_THAT(default_output("scene.json"), StartsWith("run/"));
   const auto folder = std::filesystem::temp_directory_path() / ("rhytid_output_" + std::to_string(getpid()));

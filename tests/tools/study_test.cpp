@@ -14,9 +14,11 @@
 #include "tests/support/paths.h"
 #include "tests/support/real_data.h"
 #include "tests/support/small_scenes.h"
+#include "tools/bench/pareto_variant.h"
 #include "tools/interrupt.h"
 #include "tools/study/sweep.h"
 #include "tools/study/variant_result.h"
+#include "tools/study/wrinkle_recorder.h"
 
 namespace rhytid::tools {
 namespace {
@@ -57,6 +59,40 @@ TEST(BundledExperiments, CanBeBuiltAtTheQuickSizeAndReadAtTheFullOne) {
   }
   EXPECT_GE(found, 6);
   // The others were built all the same.
+  if (head.empty()) GTEST_SKIP() << why_no_real_file(kHeadFile);
+}
+
+TEST(BundledExperiments, ThoseOfBenchParetoCanBeReadAndTheirPointsPlaced) {
+  const std::string head = real_file(kHeadFile);
+  int found = 0;
+  for (const auto& entry : fs::directory_iterator(source_dir() + "/data/scenes")) {
+    const std::string file = (entry.path() / "pareto.json").string();
+    if (!fs::exists(file)) continue;
+    SCOPED_TRACE(file);
+    ++found;
+    const Experiment e = load_experiment(file, StudySize::quick);
+    ASSERT_TRUE(e.comparison.has_value());
+    const bool needs_head = entry.path().filename().string().starts_with("head_");
+    for (const Variant& v : e.variants) {
+      SCOPED_TRACE(v.name);
+      std::vector<Setting> settings = v.settings;
+      if (needs_head && !head.empty()) settings.push_back({"/skin/surface/file=" + head});
+      const Scene scene = load_scene(e.scene, settings);
+      for (const std::string& address : e.comparison->parameters)
+        EXPECT_NO_THROW((void)describe_parameter(scene, address));
+      if (&v != &e.variants.front() || (needs_head && head.empty())) continue;
+      const SceneModel built(scene);
+      const SurfaceSamples points = comparison_points(built.model().mesh, *e.comparison);
+      EXPECT_LT(points.missing(), 0.1 * points.rows() * points.columns());
+      EXPECT_EQ(place_samples(built.model().mesh, e.measure).line->missing(), 0);
+    }
+    // Every variant is there to be compared.
+    for (const Variant& v : e.variants)
+      EXPECT_TRUE(std::any_of(e.comparison->groups.begin(), e.comparison->groups.end(), [&](const auto& g) {
+        return g.reference == v.name || std::count(g.variants.begin(), g.variants.end(), v.name) > 0;
+      })) << v.name;
+  }
+  EXPECT_GE(found, 4);
   if (head.empty()) GTEST_SKIP() << why_no_real_file(kHeadFile);
 }
 

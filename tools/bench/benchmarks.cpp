@@ -2,6 +2,7 @@
 #include "tools/bench/gradient_benchmark.h"
 #include "tools/bench/memory_benchmark.h"
 #include "tools/bench/minimisers_benchmark.h"
+#include "tools/bench/pareto_benchmark.h"
 #include "tools/bench/stability_benchmark.h"
 #include "tools/bench/stages_benchmark.h"
 #include "tools/bench/tolerance_benchmark.h"
@@ -16,6 +17,7 @@ std::vector<std::unique_ptr<Benchmark>> make_benchmarks() {
   all.push_back(make_tolerance_benchmark());
   all.push_back(make_memory_benchmark());
   all.push_back(make_minimisers_benchmark());
+  all.push_back(make_pareto_benchmark());
   return all;
 }
 

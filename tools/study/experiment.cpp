@@ -1,6 +1,5 @@
 #include "tools/study/experiment.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <set>
 
@@ -17,9 +16,6 @@ namespace rhytid::tools {
 namespace {
 
 using nlohmann::json;
-
-/// 500 in either direction; each takes some 200 bytes and is compared with its neighbours.
-constexpr int most_window_points = 250000;
 
 Rule settings_rule(const std::string& pointer, const std::string& doc) {
   return {.pointer = pointer, .type = RuleType::array, .fallback = json::array(), .doc = doc};
@@ -41,12 +37,8 @@ WrinkleMeasure read_measure(const json& j) {
     m.line_points = j["line"]["points"];
   }
   if (j.contains("window")) {
-    const json& w = j["window"];
-    m.window = SampleWindow{vector_of(w["centre"]),
-                            vector_of(w["along"]),
-                            vector_of(w["normal"]),
-                            {w["size"][0].get<double>(), w["size"][1].get<double>()}};
-    m.window_spacing = w["spacing"];
+    m.window = surface_window(j["window"]);
+    m.window_spacing = j["window"]["spacing"];
   }
   return m;
 }
@@ -54,7 +46,7 @@ WrinkleMeasure read_measure(const json& j) {
 /// What no single rule can say.
 void check(const LocatedJson& located) {
   const json& root = located.json;
-  const auto refuse = [&](const std::string& at, const std::string& got, const std::string& expected) {
+  const RefuseValue refuse = [&](const std::string& at, const std::string& got, const std::string& expected) {
     throw InputError(located.where(at) + ": " + at, got, expected);
   };
   std::set<std::string> seen;
@@ -70,38 +62,40 @@ void check(const LocatedJson& located) {
     refuse("/measure/wavelengths", shown_json(measure["wavelengths"]), "the shorter one first");
   if (measure.contains("line") && measure["line"]["from"] == measure["line"]["to"])
     refuse("/measure/line", "the same point twice", "two ends");
-  if (measure.contains("window")) {
-    const json& w = measure["window"];
-    const Vec3 along = vector_of(w["along"]), normal = vector_of(w["normal"]);
-    if (!(along.cross(normal).norm() > 1e-6 * along.norm() * normal.norm()))
-      refuse("/measure/window", shown_json(w["along"]) + " and " + shown_json(w["normal"]),
-             "two directions that span a plane");
-    if (std::min(w["size"][0].get<double>(), w["size"][1].get<double>()) < 2 * w["spacing"].get<double>())
-      refuse("/measure/window/size", shown_json(w["size"]), "at least twice the spacing");
-    const double spacing = w["spacing"];
-    const double points =
-        (1 + w["size"][0].get<double>() / spacing) * (1 + w["size"][1].get<double>() / spacing);
-    if (points > most_window_points)
-      refuse("/measure/window/spacing",
-             shown_json(w["spacing"]) + ", which are " + short_text(points) + " points",
-             "at most " + std::to_string(most_window_points));
-  }
+  if (measure.contains("window")) check_surface_window(measure["window"], "/measure/window", refuse);
+  if (root.contains("compare")) check_comparison(root["compare"], seen, refuse);
 }
 
-const RuleNode& rule_tree() {
-  static const RuleNode root = build_rule_tree(experiment_rules());
-  return root;
+std::vector<Rule> variant_rules() {
+  return {
+      {.pointer = "/variants",
+       .type = RuleType::array,
+       .is_required = true,
+       .min = 1,
+       .doc = "What is run, in this order."},
+      {.pointer = "/variants/*", .type = RuleType::object, .doc = "One variant."},
+      {.pointer = "/variants/*/name",
+       .type = RuleType::name,
+       .is_required = true,
+       .doc = "Unique; the name of its folder."},
+      {.pointer = "/variants/*/size",
+       .type = RuleType::option,
+       .fallback = "both",
+       .options = {"both", "quick", "full"},
+       .doc = "At which size it is run."},
+      settings_rule("/variants/*/settings", "Its changes of the scene."),
+      text_rule("/variants/*/settings/*"),
+      settings_rule("/variants/*/quick", "Further changes at the quick size."),
+      text_rule("/variants/*/quick/*"),
+      settings_rule("/variants/*/full", "Further changes at the full size."),
+      text_rule("/variants/*/full/*"),
+  };
 }
 
-}  // namespace
-
-const char* name(StudySize size) {
-  return size == StudySize::quick ? "quick" : "full";
-}
-
-const std::vector<Rule>& experiment_rules() {
+/// All of them, parents before children.
+std::vector<Rule> make_rules() {
   const WrinkleMeasure m;
-  static const std::vector<Rule> rules = {
+  std::vector<Rule> rules = {
       {.pointer = "", .type = RuleType::object, .is_required = true, .doc = "An experiment."},
       {.pointer = "/$schema", .type = RuleType::string, .doc = "For editors; ignored."},
       {.pointer = "/name", .type = RuleType::string, .fallback = "", .doc = "Short name."},
@@ -140,56 +134,32 @@ const std::vector<Rule>& experiment_rules() {
        .max = 100000,
        .doc = "Points along it."},
       {.pointer = "/measure/window", .type = RuleType::object, .doc = "A rectangle on the surface at rest."},
-      {.pointer = "/measure/window/centre",
-       .type = RuleType::vector3,
-       .dimension = dimension::length,
-       .is_required = true,
-       .doc = "Its centre; its points are moved to the surface."},
-      {.pointer = "/measure/window/along",
-       .type = RuleType::vector3,
-       .fallback = {1, 0, 0},
-       .doc = "Direction of its first side."},
-      {.pointer = "/measure/window/normal",
-       .type = RuleType::vector3,
-       .fallback = {0, 0, 1},
-       .doc = "Outward direction."},
-      {.pointer = "/measure/window/size",
-       .type = RuleType::vector2,
-       .dimension = dimension::length,
-       .is_required = true,
-       .min = 0,
-       .min_is_open = true,
-       .doc = "Lengths of its sides."},
-      {.pointer = "/measure/window/spacing",
-       .dimension = dimension::length,
-       .fallback = m.window_spacing,
-       .min = 0,
-       .min_is_open = true,
-       .doc = "Between points."},
-      {.pointer = "/variants",
-       .type = RuleType::array,
-       .is_required = true,
-       .min = 1,
-       .doc = "What is run, in this order."},
-      {.pointer = "/variants/*", .type = RuleType::object, .doc = "One variant."},
-      {.pointer = "/variants/*/name",
-       .type = RuleType::name,
-       .is_required = true,
-       .doc = "Unique; the name of its folder."},
-      {.pointer = "/variants/*/size",
-       .type = RuleType::option,
-       .fallback = "both",
-       .options = {"both", "quick", "full"},
-       .doc = "At which size it is run."},
-      settings_rule("/variants/*/settings", "Its changes of the scene."),
-      text_rule("/variants/*/settings/*"),
-      settings_rule("/variants/*/quick", "Further changes at the quick size."),
-      text_rule("/variants/*/quick/*"),
-      settings_rule("/variants/*/full", "Further changes at the full size."),
-      text_rule("/variants/*/full/*"),
   };
+  for (Rule& rule : surface_window_rules("/measure/window")) rules.push_back(std::move(rule));
+  for (Rule& rule : comparison_rules()) rules.push_back(std::move(rule));
+  for (Rule& rule : variant_rules()) rules.push_back(std::move(rule));
   return rules;
 }
+
+}  // namespace
+
+const char* name(StudySize size) {
+  return size == StudySize::quick ? "quick" : "full";
+}
+
+const std::vector<Rule>& experiment_rules() {
+  static const std::vector<Rule> rules = make_rules();
+  return rules;
+}
+
+namespace {
+
+const RuleNode& rule_tree() {
+  static const RuleNode root = build_rule_tree(experiment_rules());
+  return root;
+}
+
+}  // namespace
 
 nlohmann::json experiment_schema() {
   return format_schema(rule_tree(), "experiment");
@@ -199,8 +169,9 @@ std::string experiment_documentation() {
   return format_documentation(experiment_rules(), rule_tree(), "experiment", R"(# Experiment files
 
 An experiment is JSON with comments: a scene, the variants of it that `rhytid study sweep` runs side by side, and where
-their wrinkles are measured. Settings are those of `--set`; later ones win: of the experiment, of the size, of the
-variant, of the variant at the size, of the command line. `rhytid schema` describes scenes.
+their wrinkles are measured. With `compare`, `rhytid bench pareto` sets errors of its variants against their run time.
+Settings are those of `--set`; later ones win: of the experiment, of the size, of the variant, of the variant at the size,
+of the command line. `rhytid schema` describes scenes.
 )");
 }
 
@@ -254,6 +225,11 @@ Experiment load_experiment(const std::string& path, StudySize size) {
   }
   if (e.variants.empty())
     throw InputError(path + ": /variants", std::string("none at the size ") + name(size), "at least one");
+  if (root.contains("compare")) {
+    std::set<std::string> run;
+    for (const Variant& v : e.variants) run.insert(v.name);
+    e.comparison = read_comparison(root["compare"], run);
+  }
   return e;
 }
 

@@ -10,6 +10,7 @@
 #include "sim/output/wrinkles.h"
 #include "sim/scene/located_json.h"
 #include "sim/scene/rules.h"
+#include "tools/study/comparison.h"
 
 namespace rhytid::tools {
 
@@ -43,6 +44,7 @@ struct Experiment {
   WrinkleMeasure measure;
   nlohmann::json measure_json;    ///< `measure` with all defaults: what a result depends on
   std::vector<Variant> variants;  ///< those of the size asked for
+  std::optional<Comparison> comparison;
 };
 
 /// The rules of experiment.json.

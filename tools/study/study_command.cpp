@@ -19,7 +19,7 @@ void StudyCommand::add_to(CLI::App& study) {
   app_->add_option(
           "-o,--output", output_,
           "folder for results (default run/<name of the file, or of its folder when it is called scene, "
-          "case or experiment>" +
+          "case, experiment or pareto>" +
               (is_of_experiments() ? "_<size>" + (text.name == kSweep ? "" : "_" + text.name)
                                    : "[_<variant>][_full]_" + text.name) +
               ")")

@@ -88,6 +88,20 @@ TEST(LinePlotSvg, DrawsSeriesErrorsRulesAndEscapesText) {
   EXPECT_EQ(count_of(path[1], "L"), 1u) << path[1];
 }
 
+TEST(LinePlotSvg, NamesPointsWhereTheyAreDrawn) {
+  LinePlot plot;
+  plot.y.logarithmic = true;
+  plot.series.push_back(
+      {"", {1, 2, 3}, {1, 0, 10}, {}, PlotStyle::points, false, Rgb{1, 2, 3}, {"one", "none", "<ten>"}});
+  const std::string text = svg(plot);
+  expect_well_formed(text);
+  EXPECT_THAT(text, HasSubstr(">one</text>"));
+  EXPECT_THAT(text, HasSubstr(">&lt;ten&gt;</text>"));
+  EXPECT_EQ(count_of(text, ">none</text>"), 0u) << "no logarithm, no point, no name";
+  plot.series[0].names.pop_back();
+  EXPECT_THROW((void)svg(plot), ContractError);
+}
+
 TEST(LinePlotSvg, CutsLinesAtTheBox) {
   LinePlot plot;
   plot.y.minimum = 0, plot.y.maximum = 1;

@@ -52,6 +52,17 @@ TEST(SurfaceSamples, PointsBesideThePatchAreLeftOut) {
   EXPECT_TRUE(std::isnan(h(3, 8)));
   EXPECT_NEAR(h(30, 0), -4, 1e-12);
   EXPECT_NEAR(h(30, 16), 4, 1e-12);
+  // The same points by their faces: the interpolated rest position is where the grid has them.
+  ASSERT_EQ(samples.places().size(), 61u * 17u);
+  EXPECT_EQ(samples.places()[8 * 61 + 3].face, -1);
+  const SurfaceSamples::Place& at = samples.places()[16 * 61 + 40];  // (5, 4)
+  const TriangleBasis basis(mesh.order);
+  std::vector<double> weights(static_cast<std::size_t>(mesh.nodes_per_face()));
+  basis.evaluate(at.u, at.v, weights.data(), nullptr, nullptr);
+  Vec3 x = Vec3::Zero();
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    x += weights[k] * mesh.rest.row(mesh.outer_nodes(at.face)[k]).transpose();
+  EXPECT_NEAR((x - Vec3(5, 4, 0)).norm(), 0, 1e-12);
 }
 
 TEST(SurfaceSamples, AWindowHoldsThePointsAtItsEnds) {
