@@ -11,16 +11,17 @@ namespace {
 class Bench : public Verb {
  public:
   VerbHelp help() const override {
-    return {
-        "bench",
-        "benchmarks of the simulator: stability, stages, gradients, tolerances, memory, minimisers, errors "
-        "against time",
-        "Runs one benchmark and writes its tables. `stability` takes every setting to its extremes on a "
-        "small scene, `pareto` runs an experiment file; the others measure a drag over a patch of any "
-        "size, or a scene of yours (--scene).",
-        "nothing",
-        "tables (CSV, Markdown) into -o DIR, and a short account on stdout",
-        "rhytid bench stability --quick -o run/stability"};
+    return {"bench",
+            "benchmarks of the simulator: stability, stages, kernels, features, gradients, tolerances, "
+            "memory, minimisers, errors "
+            "against time",
+            "Runs one benchmark and writes its tables. `stability` takes every setting to its extremes on a "
+            "small scene, `kernels` compares the element kernels with plain ones, `pareto` runs an "
+            "experiment file; the others measure a drag over a patch of any "
+            "size, or a scene of yours (--scene).",
+            "nothing",
+            "tables (CSV, Markdown) into -o DIR, and a short account on stdout",
+            "rhytid bench stability --quick -o run/stability"};
   }
   bool takes_file() const override { return false; }
 

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "sim/terms/contact_law.h"
+#include "sim/terms/kernel_choice.h"
 #include "sim/terms/ligament_law.h"
 #include "sim/terms/make_kernel_table.h"
 
@@ -23,18 +24,22 @@ RHYTID_TABLES(pre_stretched_elastic)
 
 namespace {
 
-/// AVX2 unless the processor lacks it or RHYTID_ISA=baseline asks for the portable kernels.
-bool use_avx2() {
+bool has_avx2() {
 #ifdef RHYTID_HAVE_AVX2
-  static const bool yes = [] {
-    const char* wish = std::getenv("RHYTID_ISA");
-    if (wish && std::strcmp(wish, "baseline") == 0) return false;
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  }();
-  return yes;
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
 #else
   return false;
 #endif
+}
+
+/// AVX2 unless the processor lacks it or RHYTID_ISA=baseline asks for the portable kernels.
+bool use_avx2() {
+  static const bool yes = [] {
+    const char* wish = std::getenv("RHYTID_ISA");
+    if (wish && std::strcmp(wish, "baseline") == 0) return false;
+    return has_avx2();
+  }();
+  return yes;
 }
 
 }  // namespace
@@ -56,6 +61,13 @@ const KernelTable& pre_stretched_elastic_skin_kernels() {
 }
 const char* skin_kernel_isa() {
   return use_avx2() ? "avx2" : "baseline";
+}
+const KernelTable* skin_kernels_of(std::string_view isa) {
+  if (isa == "baseline") return &skin_table_baseline;
+#ifdef RHYTID_HAVE_AVX2
+  if (isa == "avx2" && has_avx2()) return &skin_table_avx2;
+#endif
+  return nullptr;
 }
 
 const KernelTable& ligament_kernels() {

@@ -19,16 +19,41 @@ expect() {
   local actual=$?
   [ "$actual" = "$code" ] || fail "bench $*: exit $actual, expected $code"
 }
-# column FILE NAME: the values of a column of a CSV file without quoted cells.
+# column FILE NAME: the values of a column of a CSV file whose quoted cells have one comma at most.
 column() {
-  awk -F, -v name="$2" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i; next } { print $c }' "$1"
+  sed 's/"\([^",]*\),\([^",]*\)"/\1\2/g' "$1" |
+    awk -F, -v name="$2" 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == name) c = i; next } { print $c }'
 }
 small=(--nodes 600 --frames 7)
 
 expect 0 stages "${small[@]}" --seconds 0 -o "$folder/stages"
 grep -q '^patch_600,.*,factorisation,' "$folder/stages/stages.csv" || fail "stages.csv has no factorisation"
 column "$folder/stages/stages.csv" time_ms | awk '!($1 > 0) { bad = 1 } END { exit bad || NR < 20 }' || fail "times of stages"
+# A profile: what is called in a step takes all of it, and factors and skin have a distance to their limits.
+column "$folder/stages/stages.csv" share_of_step | awk '{ s += $1 } END { exit !(s > 0.999 && s < 1.001) }' || fail "shares of a step"
+column "$folder/stages/stages.csv" share_of_fma_peak_one_thread | awk '$1 > 0 { n++ } END { exit n < 3 }' || fail "shares of the peak"
 [ -s "$folder/stages/patch_600.json" ] || fail "the patch is not kept"
+
+# Kernels and their plain references are the same sums, and not the same code.
+expect 0 kernels --cells 1 --seconds 0 -o "$folder/kernels"
+column "$folder/kernels/kernels.csv" difference |
+  awk '!($1 < 1e-10) { bad = 1 } $1 > 0 { differ = 1 } END { exit bad || !differ || NR < 17 }' || fail "kernels and plain references"
+column "$folder/kernels/kernels.csv" time_per_point_ns | awk '!($1 > 0) { exit 1 }' || fail "times of kernels"
+# (36 operations per node and point for the sums alone, P4 x P2 has 45 nodes; the law takes some hundreds.)
+grep '^skin: residual,P4 x P2,baseline,' "$folder/kernels/kernels.csv" | head -1 >"$folder/row"
+cat <(head -1 "$folder/kernels/kernels.csv") "$folder/row" >"$folder/one.csv"
+column "$folder/one.csv" flops_per_point | awk '!($1 > 36 * 45 + 300 && $1 < 36 * 45 + 3000) { exit 1 }' || fail "operations counted"
+
+# Features cost nothing where they are not; the settling step of tension and substeps are steps.
+expect 0 features --nodes 600 --frames 2 --repeats 1 --starts 1 -o "$folder/features"
+features() { grep -c "^patch_600,$1" "$folder/features/features.csv"; }
+[ "$(features .)" = 14 ] && [ "$(features 'without ligaments,.*ligaments')" = 1 ] && [ "$(features 'all features,.*ligaments')" = 0 ] ||
+  fail "variants of features"
+column "$folder/features/features.csv" steps | sort | uniq -c | awk '{ n[$2] = $1 } END { exit !(n[2] == 12 && n[3] == 1 && n[4] == 1) }' ||
+  fail "steps of variants"
+column "$folder/features/features.csv" states_MB | awk '$1 > 0 { n++; if (n == 1) less = $1; else more = $1 } END { exit !(n == 2 && more > 2 * less) }' ||
+  fail "states kept"
+[ "$(column "$folder/features/programs.csv" size_MB | wc -l)" -ge 1 ] || fail "programs"
 
 expect 0 gradient "${small[@]}" --repeats 1 --parameters 5 -o "$folder/gradient"
 [ "$(column "$folder/gradient/gradient.csv" columns)" = 5 ] || fail "columns of the Jacobian"

@@ -1,30 +1,18 @@
 #include "tools/bench/stage_times.h"
 
 #include <algorithm>
-#include <chrono>
+#include <limits>
+#include <numeric>
 #include <random>
 
 #include "adjoint/sweeps.h"
+#include "sim/core/parallel.h"
+#include "sim/terms/element_loop.h"
+#include "tools/bench/skin_operations.h"
+#include "tools/bench/timing.h"
 
 namespace rhytid::tools {
 namespace {
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-/// Median time of a call, of as many as fit into `seconds`, at least three.
-double time_of(double seconds, const std::function<void()>& call) {
-  std::vector<double> times;
-  const double end = now() + seconds;
-  while (times.size() < 3 || (now() < end && times.size() < 100000)) {
-    const double start = now();
-    call();
-    times.push_back(now() - start);
-  }
-  std::nth_element(times.begin(), times.begin() + static_cast<long>(times.size() / 2), times.end());
-  return times[times.size() / 2];
-}
 
 /// Takes element matrices and forgets them: what is left is their computation.
 class NoSink final : public Term::MatrixSink {
@@ -49,36 +37,74 @@ __attribute__((target("avx2,fma"))) double multiply_add_chains(long rounds) {
 }
 #endif
 
-double fma_rate() {
+double fma_rate(int threads) {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-    constexpr long rounds = 2'000'000;
-    volatile double kept = 0;
-    const double seconds = time_of(0.3, [&] { kept = multiply_add_chains(rounds); });
-    (void)kept;
-    return 12. * 4 * 2 * rounds / seconds;
+    constexpr long rounds = 200'000;
+    constexpr int repeats = 50;
+    std::vector<double> rates(static_cast<std::size_t>(threads)), kept = rates;
+    parallel_for(threads, [&](std::int64_t t) {
+      const auto at = static_cast<std::size_t>(t);
+      for (int k = 0; k < repeats; ++k) {
+        const double start = thread_seconds();
+        kept[at] += multiply_add_chains(rounds);
+        rates[at] = std::max(rates[at], 12. * 4 * 2 * rounds / (thread_seconds() - start));
+      }
+    });
+    volatile double seen = kept[0];
+    (void)seen;
+    return std::accumulate(rates.begin(), rates.end(), 0.);
   }
 #endif
   return 0;
 }
 
-double read_rate() {
+double read_rate(int threads) {
   const std::vector<double> big(std::size_t{32} << 20, 1.0);  // 256 MB
-  volatile double kept = 0;
-  const double seconds = time_of(0.3, [&] {
-    double sum[8] = {};
-    for (std::size_t i = 0; i < big.size(); i += 8)
-      for (std::size_t k = 0; k < 8; ++k) sum[k] += big[i + k];
-    kept = sum[0] + sum[7];
-  });
-  (void)kept;
+  std::vector<double> kept(static_cast<std::size_t>(threads));
+  double seconds = std::numeric_limits<double>::infinity();
+  for (int repeat = 0; repeat < 8; ++repeat) {
+    const double start = clock_seconds();
+    parallel_for(threads, [&](std::int64_t t) {
+      const std::size_t blocks = big.size() / 8, count = static_cast<std::size_t>(threads),
+                        at = static_cast<std::size_t>(t);
+      double sum[8] = {};
+      for (std::size_t i = 8 * (blocks * at / count); i < 8 * (blocks * (at + 1) / count); i += 8)
+        for (std::size_t k = 0; k < 8; ++k) sum[k] += big[i + k];
+      kept[at] = sum[0] + sum[7];
+    });
+    seconds = std::min(seconds, clock_seconds() - start);
+  }
+  volatile double seen = kept[0];
+  (void)seen;
   return static_cast<double>(big.size()) * sizeof(double) / seconds;
+}
+
+/// Operations of a term of skin per call, where they are counted: viscoelastic skin without tension.
+SkinOperations operations_of(const Term& term, const StepInfo& step, const TermStepData& data,
+                             const VectorXd& u) {
+  SkinOperations total;
+  if (&term.kernels() != &skin_kernels()) return total;
+  for (std::size_t gi = 0; gi < term.groups().size(); ++gi) {
+    const TermGroup& g = term.groups()[gi];
+    const TermElement e = term_element(term.kernels(), g, 0, step.dt(), data.theta[gi]);
+    const SkinOperations one =
+        count_skin_operations(term.law<SkinLaw>(), e.view, e.gather(u).data(),
+                              data.prepared.data() + e.point * static_cast<std::size_t>(SkinLaw::np));
+    total.residual += one.residual * g.num_elements * g.num_points;
+    total.hessian += one.hessian * g.num_elements * g.num_points;
+  }
+  return total;
 }
 
 }  // namespace
 
-MachineLimits measure_machine_limits() {
-  return {fma_rate(), read_rate()};
+MachineLimits measure_machine_limits(int threads) {
+  const int before = num_threads();
+  set_num_threads(threads);
+  const MachineLimits limits = {fma_rate(threads), read_rate(threads)};
+  set_num_threads(before);
+  return limits;
 }
 
 std::optional<StageReport> measure_stages(const SceneModel& scene_model, double seconds,
@@ -93,10 +119,26 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
   RunOptions options = scene_model.run_options();
   RunObserver observer;
   observer.iteration = [&](int, double, int, double, double) { return !go_on || go_on(); };
+  const TermCounters before = model.terms.front().counters();
   const Trajectory run = simulate(model, native, options, observer);
+  const TermCounters after = model.terms.front().counters();
   if (go_on && !go_on()) return std::nullopt;
   if (!run.complete) throw adjoint::GradientError("the run did not reach its last frame: " + run.failure);
 
+  report.steps = static_cast<int>(run.steps.size());
+  report.run_seconds = run.seconds;
+  double factorisations = 0;
+  for (const StepRecord& record : run.steps) {
+    report.iterations += record.report.iterations;
+    factorisations += record.report.factorisations;
+  }
+  const auto per_step = [&](double count) { return count / report.steps; };
+  const double prepares = per_step(static_cast<double>(after.prepare - before.prepare)),
+               energies = per_step(static_cast<double>(after.energy - before.energy)),
+               gradients = per_step(static_cast<double>(after.gradient - before.gradient)),
+               hessians = per_step(static_cast<double>(after.hessian - before.hessian)),
+               updates = per_step(static_cast<double>(after.update - before.update)),
+               iterations = per_step(report.iterations);
   const int last = static_cast<int>(run.steps.size()) - 1;
   const State &old = run.before(last), &state = run.steps[static_cast<std::size_t>(last)].state;
   const StepInfo& step = run.steps[static_cast<std::size_t>(last)].step;
@@ -107,41 +149,47 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
   const auto add = [&](StageTime stage, const std::function<void()>& call) {
     stopped = stopped || (go_on && !go_on());
     if (stopped) return;
-    stage.seconds = time_of(seconds, call);
+    const ThreadTimes times = fastest_seconds_by_threads(seconds, call);
+    stage.seconds = times.all;
+    stage.one_thread = times.one;
     report.stages.push_back(stage);
   };
   const double points = report.points;
 
-  add({.name = "old state"}, [&] { (void)StepProblem(model, native, step, old); });
-  add({.name = "energy", .points = points}, [&] { (void)problem.energy(q, nullptr); });
-  add({.name = "energy and gradient", .points = points}, [&] { (void)problem.energy(q, &gradient); });
+  add({.name = "old state", .calls = prepares}, [&] { (void)StepProblem(model, native, step, old); });
+  add({.name = "energy", .calls = energies, .points = points}, [&] { (void)problem.energy(q, nullptr); });
+  add({.name = "energy and gradient", .calls = gradients, .points = points},
+      [&] { (void)problem.energy(q, &gradient); });
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const Term& term = model.terms[t];
     const double own = term.num_points();
     VectorXd force = VectorXd::Zero(state.u.size());
-    add({.name = "gradient: " + term.name(), .points = own},
+    const SkinOperations operations = operations_of(term, step, problem.data(t), state.u);
+    add({.name = "gradient: " + term.name(), .points = own, .flops = operations.residual},
         [&] { (void)term.energy(step, problem.data(t), state.u, &force, nullptr); });
     NoSink sink;
-    add({.name = "element Hessians: " + term.name(), .points = own},
+    add({.name = "element Hessians: " + term.name(), .points = own, .flops = operations.hessian},
         [&] { term.hessian(step, problem.data(t), state.u, false, sink); });
   }
   BlockMatrix matrix(model.pattern());
-  add({.name = "Hessian, assembled", .points = points}, [&] { problem.hessian(q, Curvature::raw, matrix); });
+  add({.name = "Hessian, assembled", .calls = hessians, .points = points},
+      [&] { problem.hessian(q, Curvature::raw, matrix); });
   add({.name = "Hessian, projected", .points = points},
       [&] { problem.hessian(q, Curvature::projected, matrix); });
   problem.hessian(q, Curvature::raw, matrix);
-  add({.name = "ordering"}, [&] {
+  add({.name = "ordering", .is_serial = true}, [&] {
     std::vector<std::vector<int>> cliques;
     for (int c = 0; c < model.pattern().num_cliques(); ++c)
       cliques.emplace_back(model.pattern().clique(c).begin(), model.pattern().clique(c).end());
     (void)BlockPattern(model.pattern().num_blocks(), std::move(cliques));
   });
-  add({.name = "analysis"}, [&] { (void)CholeskyFactor(model.pattern()); });
+  add({.name = "analysis", .calls = per_step(1), .is_serial = true},
+      [&] { (void)CholeskyFactor(model.pattern()); });
   CholeskyFactor factor(model.pattern());
   report.factor_entries = static_cast<double>(factor.factor_entries());
   report.factor_flops = factor.factor_flops();
   bool positive = true;
-  add({.name = "factorisation", .flops = factor.factor_flops()},
+  add({.name = "factorisation", .calls = per_step(factorisations), .flops = factor.factor_flops()},
       [&] { positive = factor.factorize(matrix) && positive; });
   if (!positive)
     throw adjoint::GradientError("the Hessian at the end of the last step is not positive definite");
@@ -153,15 +201,18 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
   // Forward and backward: the factor is read twice.
   const double factor_bytes = 2. * 8 * report.factor_entries;
   if (!stopped) {
-    add({.name = "solve, 1 right-hand side", .bytes = factor_bytes},
+    add({.name = "solve, 1 right-hand side", .calls = iterations, .bytes = factor_bytes, .is_serial = true},
         [&] { solution = factor.solve(rhs.col(0)); });
-    add({.name = "solve, 8 right-hand sides", .bytes = factor_bytes}, [&] { solution = factor.solve(rhs); });
+    add({.name = "solve, 8 right-hand sides", .bytes = factor_bytes, .is_serial = true},
+        [&] { solution = factor.solve(rhs); });
   }
-  add({.name = "matrix times vector", .bytes = 8. * static_cast<double>(matrix.values().size())},
+  add({.name = "matrix times vector",
+       .bytes = 8. * static_cast<double>(matrix.values().size()),
+       .is_serial = true},
       [&] { gradient = matrix.multiply(rhs.col(0)); });
-  add({.name = "feasible step", .points = points},
+  add({.name = "feasible step", .calls = iterations, .points = points},
       [&] { (void)problem.largest_feasible_step(q, 1e-3 * rhs.col(0)); });
-  add({.name = "new state", .points = points}, [&] { (void)problem.advance(state.u); });
+  add({.name = "new state", .calls = updates, .points = points}, [&] { (void)problem.advance(state.u); });
 
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const Term& term = model.terms[t];

@@ -1,0 +1,129 @@
+#include "tools/bench/skin_operations.h"
+
+#include <vector>
+
+#include "sim/terms/point_kernel.h"
+
+namespace rhytid::tools {
+namespace {
+
+/// A number that counts what is done with it. Adding to one that was only initialised to zero is no operation.
+struct Counted {
+  double v = 0;
+  bool blank = true;
+  Counted() = default;
+  Counted(double value) : v(value), blank(false) {}
+  static inline long operations = 0;
+};
+
+Counted counted(double value) {
+  ++Counted::operations;
+  return value;
+}
+Counted operator+(const Counted& a, const Counted& b) {
+  if (a.blank) return b;
+  return counted(a.v + b.v);
+}
+Counted operator-(const Counted& a, const Counted& b) {
+  return counted(a.v - b.v);
+}
+Counted operator*(const Counted& a, const Counted& b) {
+  return counted(a.v * b.v);
+}
+Counted operator/(const Counted& a, const Counted& b) {
+  return counted(a.v / b.v);
+}
+Counted operator-(const Counted& a) {
+  return {-a.v};
+}
+Counted& operator+=(Counted& a, const Counted& b) {
+  return a = a + b;
+}
+Counted& operator-=(Counted& a, const Counted& b) {
+  return a = a - b;
+}
+bool operator<(const Counted& a, const Counted& b) {
+  return a.v < b.v;
+}
+bool operator>(const Counted& a, const Counted& b) {
+  return a.v > b.v;
+}
+bool operator!=(const Counted& a, const Counted& b) {
+  return a.v != b.v;
+}
+Counted select(bool condition, const Counted& a, const Counted& b) {
+  return condition ? a : b;
+}
+Counted lane_sqrt(const Counted& a) {
+  return counted(std::sqrt(a.v));
+}
+template <class F>
+Counted map_lanes(F f, const Counted& a) {
+  return counted(f(a.v));
+}
+
+using Kin = PrismKinematics;
+using Kernel = PointKernel<SkinLaw, Kin>;
+
+}  // namespace
+
+SkinOperations count_skin_operations(const SkinLaw& law, const ElementView& view, const double* u,
+                                     const double* prepared) {
+  static double natural[3][kMaxRows];
+  gather<3>(view, u, natural);
+  double constants[SkinLaw::num_constants];
+  law.constants(view.theta, view.dt, constants);
+  const Counted constant = constants[0];
+  SkinOperations total;
+  for (int q = 0; q < view.num_points; ++q) {
+    Counted local[9], jacobian[9], h[9], y[6], history[6], theta[5], sigma[6], tangent[6][6], piola[9],
+        out[9];
+    for (int a = 0; a < 3; ++a)
+      for (int r = 0; r < 3; ++r) local[3 * a + r] = natural[a][3 * q + r];
+    for (int i = 0; i < 9; ++i) jacobian[i] = view.inverse_jacobian[9 * q + i];
+    for (int c = 0; c < 6; ++c) history[c] = prepared[6 * q + c];
+    for (int c = 0; c < 5; ++c) theta[c] = view.theta[c];
+    const Counted weight = view.weight[q];
+    const auto count = [](auto&& call) {
+      const long before = Counted::operations;
+      call();
+      return static_cast<double>(Counted::operations - before);
+    };
+    const double strain = count([&] {
+      Kin::to_point(local, jacobian, h);
+      Kin::strain(h, y);
+    });
+    total.residual += strain + count([&] {
+                        (void)Kin::det_minus_one_of(h);
+                        (void)law.response<Counted>(y, history, theta, &constant, sigma, nullptr);
+                        Kin::strain_transpose(h, sigma, piola);
+                        Kin::from_point(piola, jacobian, weight, out);
+                      });
+    total.hessian +=
+        strain + count([&] { (void)law.response<Counted>(y, history, theta, &constant, sigma, tangent); }) +
+        18 * count([&] { Kin::from_point(piola, jacobian, weight, out); });
+  }
+  const double n = view.num_nodes;
+  const double sums = 2 * 9 * n;  // nodes to points, or back: three components of three directions
+  // Material block: [6][9] and [9][9] sums of three products; geometric part.
+  const double block = 2 * 3 * (6 * 9 + 9 * 9) + 27;
+  // Left factors: six blocks (a ≤ b) of three rows; products: three full blocks and three upper halves.
+  const double dense = 6 * 3 * 5 * n + 3 * 3 * 2 * n * n + 3 * 3 * n * (n + 1);
+  total.residual = total.residual / view.num_points + 2 * sums;
+  total.hessian = total.hessian / view.num_points + sums + block + dense;
+  return total;
+}
+
+double skin_residual_by_points(const SkinLaw& law, const ElementView& view, const double* u,
+                               const double* prepared, double* f) {
+  return Kernel::energy_by_points(law, view, u, prepared, f);
+}
+
+void skin_hessian_by_points(const SkinLaw& law, const ElementView& view, const double* u,
+                            const double* prepared, double* dense) {
+  const std::size_t n = view.padded_nodes;
+  std::vector<double> work(6 * n * n + 7 * kHessianRows * n);
+  (void)Kernel::hessian_by_points(law, view, u, prepared, false, work.data(), dense);
+}
+
+}  // namespace rhytid::tools
