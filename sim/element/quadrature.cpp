@@ -64,7 +64,8 @@ const PrismRule& prism_rule(int degree) {
 PrismRule tensor_rule(const TriangleRule& triangle, int num_points) {
   PrismRule rule{triangle.name + " x GL" + std::to_string(num_points),
                  std::min(triangle.degree, 2 * num_points - 1),
-                 {}};
+                 {},
+                 num_points};
   const std::vector<LinePoint> line = gauss_legendre(num_points);
   for (const TrianglePoint& t : triangle.points)
     for (const LinePoint& l : line) rule.points.push_back({t.u, t.v, l.w, t.weight * l.weight});

@@ -42,6 +42,7 @@ struct PrismRule {
   std::string name;  ///< e.g. "prism6-28" or "tri10-25 x GL3"
   int degree;
   std::vector<PrismPoint> points;
+  int line_points = 0;  ///< points through the thickness when the rule is a product (tensor_rule), else 0
 };
 
 /// The stored prism rule of lowest degree ≥ `degree`: 1 (centroid × 2 Gauss points), 4, 5, 6, 8; the rules

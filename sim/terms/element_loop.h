@@ -51,7 +51,8 @@ inline TermElement term_element(const KernelTable& kernels, const TermGroup& g, 
       {g.num_nodes, g.padded_nodes, g.num_points, g.padded_rows, g.node_by_row.data(), g.rows_by_node.data(),
        g.inverse_jacobian.empty() ? nullptr : g.inverse_jacobian.data() + e * nq * 9,
        g.weight.data() + e * nq, kernels.nrest ? g.rest.data() + e * nq * kernels.nrest : nullptr,
-       theta.data() + (per_point ? e * nq * kernels.ntheta : 0), per_point ? kernels.ntheta : 0, dt}};
+       theta.data() + (per_point ? e * nq * kernels.ntheta : 0), per_point ? kernels.ntheta : 0, dt,
+       g.product.view()}};
 }
 
 /// Calls visit(TermElement) for elements first..first+count−1 of group `gi` of a term, in parallel.

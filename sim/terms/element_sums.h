@@ -95,7 +95,7 @@ void scatter_directions(const ElementView& v, const Lanes* local, int q, int k, 
 template <int R>
 class HessianBlocks {
  public:
-  /// `work` holds 6·npad² + 7·kHessianRows·npad doubles.
+  /// `work` holds hessian_work_size() doubles.
   HessianBlocks(const ElementView& v, double* work)
       : v_(v),
         blocks_(work),

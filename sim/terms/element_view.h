@@ -1,12 +1,37 @@
 // What an element kernel is given, as plain numbers and pointers.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+
 namespace rhytid {
 
 /// Directions that one tangent kernel call carries.
 inline constexpr int kDirections = 8;
 /// Rows of the table that one Hessian pass treats; a multiple of R.
 inline constexpr int kHessianRows = 24;
+
+/// Points through the thickness at most, and length of a row of their table.
+inline constexpr int kMaxLinePoints = 6, kLineStride = 8;
+
+/// Where a prism's shape functions and points are products of plane and line, both factors by themselves: node
+/// (j, c) is j · line_nodes + c, point (t, z) is t · line_points + z.
+struct ProductView {
+  int plane_nodes = 0, padded_plane_nodes = 0;  ///< padded to a multiple of 4
+  int line_nodes = 0, line_points = 0;          ///< 0 points: no product
+  const double* plane = nullptr;                ///< [t][∂/∂u, ∂/∂v, value][padded_plane_nodes]
+  const double* line = nullptr;                 ///< [z][value, ∂/∂w][kLineStride]
+};
+
+/// Doubles that the sum of an element's Hessian needs (HessianBlocks, ProductHessian).
+inline std::size_t hessian_work_size(int padded_nodes, const ProductView& p) {
+  constexpr std::size_t pad = 8;
+  const std::size_t n8 = static_cast<std::size_t>(padded_nodes), rows = kHessianRows;
+  const std::size_t m = 3 * static_cast<std::size_t>(p.line_nodes),
+                    np = static_cast<std::size_t>(p.plane_nodes), n = m * np;
+  return std::max(6 * n8 * n8 + 7 * rows * n8,
+                  n * (n + pad) + rows * (n + 2 * pad) + m * rows * 3 * (m + pad));
+}
 
 /// Everything an element kernel reads, as plain pointers (null where a law has none).
 struct ElementView {
@@ -20,7 +45,8 @@ struct ElementView {
   const double* rest;              ///< [nq][nrest]
   const double* theta;             ///< [nq][ntheta], or one row when theta_stride = 0
   int theta_stride;
-  double dt;  ///< s
+  double dt;                 ///< s
+  ProductView product = {};  ///< prisms with a product rule
 };
 
 }  // namespace rhytid

@@ -10,6 +10,35 @@
 
 namespace rhytid {
 
+namespace {
+
+ProductTables product_tables(const TriangleBasis& triangle, const LineBasis& line, const MaterialSlab& slab,
+                             const PrismRule& rule) {
+  ProductTables t;
+  t.plane_nodes = triangle.num_nodes();
+  t.padded_plane_nodes = (t.plane_nodes + 3) / 4 * 4;
+  t.line_nodes = line.num_nodes();
+  t.line_points = rule.line_points;
+  require(t.line_points <= kMaxLinePoints && t.line_nodes <= kLineStride, "prism_group: too many points");
+  const std::size_t padded = static_cast<std::size_t>(t.padded_plane_nodes),
+                    plane_points = rule.points.size() / static_cast<std::size_t>(t.line_points);
+  t.plane.resize(plane_points * 3 * padded);
+  t.line.resize(static_cast<std::size_t>(t.line_points) * 2 * kLineStride);
+  for (std::size_t k = 0; k < plane_points; ++k) {
+    const PrismPoint& point = rule.points[k * static_cast<std::size_t>(t.line_points)];
+    double* const row = t.plane.data() + k * 3 * padded;
+    triangle.evaluate(point.u, point.v, row + 2 * padded, row, row + padded);
+  }
+  for (int z = 0; z < t.line_points; ++z) {
+    const double w = slab.w_begin + 0.5 * (slab.w_end - slab.w_begin) * (rule.points[z].w + 1);
+    double* const row = t.line.data() + static_cast<std::size_t>(z) * 2 * kLineStride;
+    line.evaluate(w, row, row + kLineStride);
+  }
+  return t;
+}
+
+}  // namespace
+
 TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSlab& slab,
                       const TriangleRule& rule, int thickness_points) {
   return prism_group(mesh, element_layer, slab, tensor_rule(rule, thickness_points));
@@ -43,6 +72,7 @@ TermGroup prism_group(const SkinMesh& mesh, int element_layer, const MaterialSla
       }
     reference_weight[q++] = point.weight * half;
   }
+  if (rule.line_points > 0) g.product = product_tables(triangle, line, slab, rule);
   g.inverse_jacobian.resize(static_cast<std::size_t>(g.num_elements) * g.num_points * 9);
   g.weight.resize(static_cast<std::size_t>(g.num_elements) * g.num_points);
   for (int face = 0; face < mesh.num_faces; ++face) {

@@ -14,6 +14,7 @@
 
 #include "sim/math/jacobi.h"
 #include "sim/terms/element_sums.h"
+#include "sim/terms/product_hessian.h"
 
 namespace rhytid {
 inline namespace RHYTID_ISA {
@@ -88,7 +89,7 @@ struct PackedKernel {
 
   static bool hessian(const Law& law, const ElementView& v, const double* u, const double* prepared,
                       bool projected, double* work, double* dense) {
-    HessianBlocks<3> blocks(v, work);
+    ElementHessian<3> blocks(v, work);
     double natural[3][kMaxRows], shared[at_least_one(nc)] = {};
     if (v.theta_stride == 0) law.constants(v.theta, v.dt, shared);
     gather<3>(v, u, natural);

@@ -119,7 +119,7 @@ struct PointKernel {
   /// The same without packs, by dual numbers.
   static bool hessian_by_points(const Law& law, const ElementView& v, const double* u, const double* prepared,
                                 bool projected, double* work, double* dense) {
-    HessianBlocks<R> blocks(v, work);
+    ElementHessian<R> blocks(v, work);
     double natural[3][max_rows], z[nz], e[ne];
     gather<R>(v, u, natural);
     for (int q = 0; q < v.num_points; ++q) {

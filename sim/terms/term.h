@@ -40,6 +40,15 @@ struct ThetaSlot {
   double value = 0;                                ///< fixed
 };
 
+/// The factors of a prism's table, where it has them (ProductView has the shapes).
+struct ProductTables {
+  int plane_nodes = 0, padded_plane_nodes = 0, line_nodes = 0, line_points = 0;
+  std::vector<double> plane, line;
+  ProductView view() const {
+    return {plane_nodes, padded_plane_nodes, line_nodes, line_points, plane.data(), line.data()};
+  }
+};
+
 /// Elements of one shape and one parameter set; the arrays' shapes are those of ElementView with a leading
 /// element index.
 struct TermGroup {
@@ -48,6 +57,7 @@ struct TermGroup {
   std::vector<int> nodes;                ///< [num_elements][num_nodes] mesh nodes
   std::vector<double> node_by_row;       ///< [num_points·R][padded_nodes]
   std::vector<double> rows_by_node;      ///< [num_nodes][padded_rows]
+  ProductTables product;                 ///< prisms with a product rule
   std::vector<double> inverse_jacobian;  ///< [num_elements][num_points][9], prisms only
   std::vector<double> weight;            ///< [num_elements][num_points]
   std::vector<double> rest;              ///< [num_elements][num_points][nrest]

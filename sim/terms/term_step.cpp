@@ -49,9 +49,8 @@ void Term::hessian(const StepInfo& step, const TermStepData& data, const VectorX
   ++counters_.hessian;
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
     const TermGroup& g = groups_[gi];
-    const std::size_t size = static_cast<std::size_t>(3 * g.num_nodes) * (3 * g.num_nodes),
-                      n8 = g.padded_nodes;
-    const std::size_t work_size = 6 * n8 * n8 + 7 * kHessianRows * n8;
+    const std::size_t size = static_cast<std::size_t>(3 * g.num_nodes) * (3 * g.num_nodes);
+    const std::size_t work_size = hessian_work_size(g.padded_nodes, g.product.view());
     // While elements of one chunk are computed, one thread adds those of the chunk before, in order.
     const int chunk = std::min(32, g.num_elements);
     struct Chunk {

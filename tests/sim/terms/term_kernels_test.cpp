@@ -76,6 +76,30 @@ TEST(TermKernels, GradientAndHessianByOrder) {
   }
 }
 
+TEST(TermKernels, ProductSumOfTheHessianIsTheSumPointByPoint) {
+  int products = 0;
+  for (const TermCase& c : all_cases()) {
+    SCOPED_TRACE(c.name);
+    Term by_points = c.term();
+    bool has_product = false;
+    for (TermGroup& g : by_points.groups()) {
+      has_product = has_product || g.product.line_points > 0;
+      g.product = {};
+    }
+    if (!has_product) continue;
+    ++products;
+    TermStepData data;
+    c.term().prepare(c.step, c.native, c.u_old, c.history.data(), data);
+    for (const bool projected : {false, true}) {
+      DenseSink product(static_cast<int>(c.u.size())), points = product;
+      c.term().hessian(c.step, data, c.u, projected, product);
+      by_points.hessian(c.step, data, c.u, projected, points);
+      EXPECT_LE((product.matrix - points.matrix).norm(), 1e-14 * points.matrix.norm()) << projected;
+    }
+  }
+  EXPECT_GE(products, 5);
+}
+
 TEST(TermKernels, TangentBlocksByOrder) {
   Rng rng(6);
   constexpr int D = kDirections;
