@@ -55,8 +55,8 @@ class BlockMatrix {
   std::vector<double> values_;
 };
 
-/// Of a factor's numbers. Those in single precision take about half the time and solve to some six digits less than
-/// the logarithm of the condition number: a preconditioner, no certificate.
+/// Of a factor's numbers. Those in single precision solve to some seven digits less the decimal logarithm of the
+/// condition number: a preconditioner, no certificate.
 enum class Precision { full, single };
 
 /// Supernodal Cholesky over OpenBLAS: CHOLMOD analyses once per object, whose pattern must outlive it, and
@@ -78,7 +78,7 @@ class CholeskyFactor {
   MatrixXd solve(const MatrixXd& rhs) const;
   /// The same with one step of iterative refinement against `matrix`, which must be the matrix factorised.
   MatrixXd solve(const BlockMatrix& matrix, const MatrixXd& rhs) const;
-  /// The solution of A x = b by conjugate gradients with this factor as preconditioner, to |b − A x| ≤ tolerance
+  /// The solution of A x = b by conjugate gradients with this factor as preconditioner, to |b − A x| ≤ 2 tolerance
   /// |b|; `matrix` must be the matrix factorised (without shift). Nothing when that takes more than
   /// `max_iterations` or meets a direction of negative curvature.
   std::optional<VectorXd> solve_iteratively(const BlockMatrix& matrix, const VectorXd& rhs, double tolerance,

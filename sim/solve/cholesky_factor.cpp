@@ -175,10 +175,10 @@ MatrixXd CholeskyFactor::solve(const BlockMatrix& matrix, const MatrixXd& rhs) c
 std::optional<VectorXd> CholeskyFactor::solve_iteratively(const BlockMatrix& matrix, const VectorXd& rhs,
                                                           double tolerance, int max_iterations) const {
   const double wanted = tolerance * rhs.norm();
+  if (wanted == 0) return VectorXd::Zero(rhs.size());
   VectorXd x = VectorXd::Zero(rhs.size()), r = rhs, direction;
   double old_rz = 0;
   for (int k = 0; k < max_iterations; ++k) {
-    if (r.norm() <= wanted) return x;
     const VectorXd z = solve(r);
     const double rz = r.dot(z);
     direction = k == 0 ? z : VectorXd(z + rz / old_rz * direction);
@@ -188,8 +188,11 @@ std::optional<VectorXd> CholeskyFactor::solve_iteratively(const BlockMatrix& mat
     x += rz / curvature * direction;
     r -= rz / curvature * product;
     old_rz = rz;
+    if (r.norm() > wanted) continue;
+    // The recurrence drifts away from the residual where the matrix is ill-conditioned.
+    if ((rhs - matrix.multiply(x)).norm() <= 2 * wanted) return x;
+    return std::nullopt;
   }
-  if (r.norm() <= wanted) return x;
   return std::nullopt;
 }
 

@@ -119,6 +119,10 @@ bool Minimisation::factorize(double shift, bool full) {
     ++report_.factorisations;
     if (precision == Precision::single) ++report_.single_factorisations;
     const bool ok = factor_.factorize(matrix_, shift, precision);
+    if (shift == 0) {  // the raw Hessian
+      report_.smallest_pivot = factor_.smallest_pivot();
+      report_.largest_pivot = factor_.largest_pivot();
+    }
     if (!ok) ++report_.failed_factorisations;
     return ok;
   };
@@ -131,10 +135,7 @@ bool Minimisation::factorize(double shift, bool full) {
 
 bool Minimisation::factor_raw(bool final) {
   objective_.hessian(at_.q, Curvature::raw, matrix_);
-  const bool ok = factorize(0, final);
-  report_.smallest_pivot = factor_.smallest_pivot();
-  report_.largest_pivot = factor_.largest_pivot();
-  return ok;
+  return factorize(0, final);
 }
 
 bool Minimisation::factor_projected(bool full) {
@@ -149,8 +150,8 @@ std::optional<VectorXd> Minimisation::raw_direction() {
   if (factor_.precision() == Precision::full) return -factor_.solve(at_.gradient);
   if (auto found = factor_.solve_iteratively(matrix_, at_.gradient, kDirectionTolerance, kMaxCorrections))
     return -*found;
-  single_ = false;
   if (!factorize(0, /*full=*/true)) return std::nullopt;
+  single_ = false;
   return -factor_.solve(at_.gradient);
 }
 

@@ -108,7 +108,7 @@ struct PointKernel {
     return total;
   }
 
-  /// Dense Hessian [3n][3n], node-major, full. False when it is zero. `work` as HessianBlocks wants it.
+  /// Dense Hessian [3n][3n], node-major, full. False when it is zero. `work`: hessian_work_size().
   static bool hessian(const Law& law, const ElementView& v, const double* u, const double* prepared,
                       bool projected, double* work, double* dense) {
     if constexpr (has_response)

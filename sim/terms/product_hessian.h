@@ -86,7 +86,7 @@ class ProductHessian {
         for (int r = 0; r < 3; ++r)
           for (int s = 0; s < 3; ++s, ++entry)
             for (int c = 0; c < nl; ++c) {
-              Lanes sum[2] = {};
+              Lanes sum[kLineStride / kLanes] = {};
               for (int z = 0; z < p_.line_points; ++z) {
                 const double* const line = p_.line + static_cast<std::size_t>(z) * 2 * kLineStride;
                 const double factor = line[(r == 2 ? kLineStride : 0) + c] * a_[z][entry];

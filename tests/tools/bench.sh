@@ -29,7 +29,7 @@ small=(--nodes 600 --frames 7)
 expect 0 stages "${small[@]}" --seconds 0 -o "$folder/stages"
 grep -q '^patch_600,.*,factorisation,' "$folder/stages/stages.csv" || fail "stages.csv has no factorisation"
 column "$folder/stages/stages.csv" time_ms | awk '!($1 > 0) { bad = 1 } END { exit bad || NR < 20 }' || fail "times of stages"
-# A profile: what is called in a step takes all of it, and factors and skin have a distance to their limits.
+# A profile: shares add up, and factors and skin have a distance to their limits.
 column "$folder/stages/stages.csv" share_of_step | awk '{ s += $1 } END { exit !(s > 0.999 && s < 1.001) }' || fail "shares of a step"
 column "$folder/stages/stages.csv" share_of_fma_peak_one_thread | awk '$1 > 0 { n++ } END { exit n < 3 }' || fail "shares of the peak"
 [ -s "$folder/stages/patch_600.json" ] || fail "the patch is not kept"

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 
 #include "sim/core/parallel.h"
 #include "sim/output/atomic_file.h"
@@ -59,7 +60,9 @@ double plain_residual(const KernelCase& c, const KernelCases& all, const PlainRe
   return energy;
 }
 
+/// Infinite where either is not finite, which maxima would pass over.
 double relative_difference(const VectorXd& a, const VectorXd& b) {
+  if (!a.allFinite() || !b.allFinite()) return std::numeric_limits<double>::infinity();
   return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
 }
 

@@ -18,6 +18,7 @@ MinimiserOptions minimiser_to_compare(Minimiser method, const MinimiserOptions& 
   options.relative_tolerance = of_scene.relative_tolerance;
   options.absolute_tolerance = of_scene.absolute_tolerance;
   options.max_iterations = 1000000;
+  options.precision = of_scene.precision;
   return options;
 }
 

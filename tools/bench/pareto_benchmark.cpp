@@ -6,6 +6,7 @@
 
 #include "adjoint/parameter_space.h"
 #include "sim/core/error.h"
+#include "sim/core/parallel.h"
 #include "sim/scene/load.h"
 #include "tools/bench/pareto_report.h"
 #include "tools/bench/pareto_variant.h"
@@ -58,6 +59,8 @@ class ParetoBenchmark : public Benchmark {
         context.progress.note(v.name + ": " + result->status + " before, kept");
       } else {
         std::filesystem::create_directories(own);
+        // What is there belongs to other settings from now on, however this run ends.
+        write_variant(own, {v.name, {}, "running", "", {}});
         const SceneModel scene_model(load_scene(experiment.scene, settings_of(v)));
         result = measure_pareto_variant(scene_model, experiment, repeats_, own,
                                         {v.name, identities[v.name], "running", "", {}}, context.progress);
@@ -103,7 +106,9 @@ class ParetoBenchmark : public Benchmark {
       (void)place_samples(built.model().mesh, experiment.measure);
       const adjoint::ParameterSpace space(built, experiment.comparison->parameters);
       return study_identity(built.scene(), built.model(),
-                            experiment.measure_json.dump() + experiment.comparison->depends_on.dump());
+                            experiment.measure_json.dump() + experiment.comparison->depends_on.dump() +
+                                " repeats " + std::to_string(repeats_) + " threads " +
+                                std::to_string(num_threads()));
     } catch (const InputError& error) {
       throw InputError(experiment.file + ": variant " + v.name + ": " + error.what());
     }

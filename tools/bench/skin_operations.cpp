@@ -108,7 +108,14 @@ SkinOperations count_skin_operations(const SkinLaw& law, const ElementView& view
   // Material block: [6][9] and [9][9] sums of three products; geometric part.
   const double block = 2 * 3 * (6 * 9 + 9 * 9) + 27;
   // Left factors: six blocks (a ≤ b) of three rows; products: three full blocks and three upper halves.
-  const double dense = 6 * 3 * 5 * n + 3 * 3 * 2 * n * n + 3 * 3 * n * (n + 1);
+  double dense = 6 * 3 * 5 * n + 3 * 3 * 2 * n * n + 3 * 3 * n * (n + 1);
+  if (view.product.line_points > 0) {
+    // Per point of the plane, of which each has line_points: 54 entries through the thickness, then left factors
+    // and products for every pair of (component, line node).
+    const double nl = view.product.line_nodes, nz = view.product.line_points, np = view.product.plane_nodes,
+                 pairs = 3 * nl * (3 * nl + 1) / 2;
+    dense = (54 * nl * nz * (1 + 2 * nl) + pairs * (3 * 5 * np + 2 * 3 * np * np)) / nz;
+  }
   total.residual = total.residual / view.num_points + 2 * sums;
   total.hessian = total.hessian / view.num_points + sums + block + dense;
   return total;
@@ -121,8 +128,7 @@ double skin_residual_by_points(const SkinLaw& law, const ElementView& view, cons
 
 void skin_hessian_by_points(const SkinLaw& law, const ElementView& view, const double* u,
                             const double* prepared, double* dense) {
-  const std::size_t n = view.padded_nodes;
-  std::vector<double> work(6 * n * n + 7 * kHessianRows * n);
+  std::vector<double> work(hessian_work_size(view.padded_nodes, view.product));
   (void)Kernel::hessian_by_points(law, view, u, prepared, false, work.data(), dense);
 }
 
