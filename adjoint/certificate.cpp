@@ -104,9 +104,10 @@ VectorXd Certification::random_direction(int size) {
 }
 
 void Certification::choose_parameters() {
-  std::vector<std::string> wanted = options_.addresses, all;
+  std::vector<std::string> wanted, all;
   for (const ParameterSpec& spec : all_parameters(scene_model_.scene())) all.push_back(spec.address);
-  if (wanted.empty()) wanted = all;
+  for (const std::string& address : options_.addresses.empty() ? all : options_.addresses)
+    (scene_model_.is_smooth_in(address, run_) ? wanted : report_.not_smooth).push_back(address);
   // A modulus that only scales all forces has terms that cancel, but for rounding as in the gauge identity.
   const auto terms = [this](const ParameterSpace& space) {
     return space.jacobian().col(0).cwiseProduct(adjoint_.native_bar).eval();
@@ -157,8 +158,9 @@ void Certification::duality() {
     const double backward = directions.col(k).dot(adjoint_.native_bar);
     // A sum that nearly cancels is compared with a hundredth of its terms.
     const double scale = std::max({std::fabs(forward), std::fabs(backward), 1e-2 * terms});
-    worst = std::max(
-        worst, scale > 0 ? std::fabs(forward - backward) / scale : std::numeric_limits<double>::infinity());
+    // Nothing on either side, where nothing has an effect, is no disagreement; what is no number is one.
+    const double error = std::fabs(forward - backward), relative = error == 0 ? 0 : error / scale;
+    worst = std::max(worst, std::isfinite(relative) ? relative : std::numeric_limits<double>::infinity());
   }
   const bool ok = worst <= options_.largest_duality;
   add({"duality", worst, options_.largest_duality, ok ? Verdict::pass : Verdict::fail,
@@ -288,40 +290,45 @@ void Certification::gauge() {
 }
 
 void Certification::error_bar() {
-  begin("loosely converged run", static_cast<int>(run_.steps.size()));
-  MinimiserOptions loose;
-  loose.relative_tolerance = options_.loose_tolerance;
-  const auto observe = [this](int, const StepProblem&, const State&) { return tick(); };
-  const Trajectory run = resimulate(model_, native_, run_, loose, {}, observe, true);
-  if (stopped_) throw Stopped{};
   CertificateCheck check{"error bar", 0, options_.largest_error_bar_error, Verdict::warning, ""};
-  if (!run.complete) {
-    check.sentence = "the loosely converged run failed, so that the error bar was not tested: " + run.failure;
-    add(check);
-    return;
+  // What the prediction leaves out is of second order: where the first cancels by chance a tighter run decides.
+  // That of a wrong residual or adjoint stays as it is.
+  double tolerance = options_.loose_tolerance;
+  for (int attempt = 0; attempt < 3; ++attempt, tolerance *= 0.1) {
+    begin("loosely converged run", static_cast<int>(run_.steps.size()));
+    MinimiserOptions loose;
+    loose.relative_tolerance = tolerance;
+    const auto observe = [this](int, const StepProblem&, const State&) { return tick(); };
+    const Trajectory run = resimulate(model_, native_, run_, loose, {}, observe, true);
+    if (stopped_) throw Stopped{};
+    if (!run.complete) {
+      check.sentence =
+          "the loosely converged run failed, so that the error bar was not tested: " + run.failure;
+      break;
+    }
+    double predicted = 0;
+    try {
+      predicted = options_.adjoint(model_, native_, run, output_, weights_).residual_error;
+    } catch (const GradientError& error) {
+      check.sentence = std::string("the loosely converged run has no gradient: ") + error.what();
+      break;
+    }
+    const double actual = functional_->difference(run);
+    if (actual == 0 || std::fabs(actual) < 100 * report_.noise) {
+      if (attempt == 0)
+        check.sentence =
+            text("the loosely converged run is off by %.1e only, too little to compare with", actual);
+      break;
+    }
+    check.figure = std::fabs(predicted - actual) / std::fabs(actual);
+    const bool ok = check.figure <= check.threshold;
+    check.verdict = ok ? Verdict::pass : Verdict::fail;
+    check.sentence = text(
+        "at tolerance %.0e the functional is off by %.3e and adjoint times residual says %.3e; in the "
+        "certified run it says %.1e",
+        tolerance, actual, predicted, report_.error_bar);
+    if (ok) break;
   }
-  double predicted = 0;
-  try {
-    predicted = options_.adjoint(model_, native_, run, output_, weights_).residual_error;
-  } catch (const GradientError& error) {
-    check.sentence = std::string("the loosely converged run has no gradient: ") + error.what();
-    add(check);
-    return;
-  }
-  const double actual = functional_->difference(run);
-  if (std::fabs(actual) < 100 * report_.noise) {
-    check.sentence =
-        text("the loosely converged run is off by %.1e only, too little to compare with", actual);
-    add(check);
-    return;
-  }
-  check.figure = std::fabs(predicted - actual) / std::fabs(actual);
-  const bool ok = check.figure <= check.threshold;
-  check.verdict = ok ? Verdict::pass : Verdict::fail;
-  check.sentence = text(
-      "at tolerance %.0e the functional is off by %.3e and adjoint times residual says %.3e; in the "
-      "certified run it says %.1e",
-      options_.loose_tolerance, actual, predicted, report_.error_bar);
   add(check);
 }
 

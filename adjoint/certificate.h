@@ -75,11 +75,13 @@ struct CertificateReport {
   std::vector<ParameterSpec> parameters;    ///< tested jointly
   std::vector<double> gradient;             ///< dQ/dx of those, x as in parameter_space.h
   std::vector<std::string> without_effect;  ///< addresses left out: derivative zero but for rounding
-  std::vector<RegimeCount> regimes;         ///< how much contact, stick and slip the run saw
-  std::vector<double> step_times;           ///< s, end of each step
-  SweepReport steps;                        ///< pivots and residuals per step
-  double noise = 0;                         ///< of the functional
-  double error_bar = 0;                     ///< Σ adjᵀ R of the run itself
+  /// Addresses left out: results are not differentiable by them here (SceneModel::is_smooth_in).
+  std::vector<std::string> not_smooth;
+  std::vector<RegimeCount> regimes;  ///< how much contact, stick and slip the run saw
+  std::vector<double> step_times;    ///< s, end of each step
+  SweepReport steps;                 ///< pivots and residuals per step
+  double noise = 0;                  ///< of the functional
+  double error_bar = 0;              ///< Σ adjᵀ R of the run itself
   double forward_seconds = 0, tangent_seconds = 0, adjoint_seconds = 0, total_seconds = 0;
   bool interrupted = false;
   /// No check failed and all were done.

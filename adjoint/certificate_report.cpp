@@ -56,6 +56,8 @@ std::string certificate_text(const CertificateReport& r) {
     out += line("  %-50s %.6g %s (%s)  %.6e", r.parameters[k].address.c_str(), r.parameters[k].value,
                 r.parameters[k].unit.c_str(), to_string(r.parameters[k].transform).c_str(), r.gradient[k]);
   for (const std::string& address : r.without_effect) out += "  " + address + "  no effect\n";
+  for (const std::string& address : r.not_smooth)
+    out += "  " + address + "  not tested: a path has a kink at the end of a step or within 0.1 ms of it\n";
   if (!r.regimes.empty()) out += "\npoints over all steps\n";
   for (const RegimeCount& c : r.regimes)
     out += line("  %-30s %-10s %10ld", c.term.c_str(), c.regime.c_str(), c.points);
@@ -100,6 +102,7 @@ nlohmann::json certificate_json(const CertificateReport& r) {
                                {"transform", to_string(r.parameters[k].transform)},
                                {"gradient", r.gradient[k]}});
   j["without_effect"] = r.without_effect;
+  j["not_smooth"] = r.not_smooth;
   for (const RegimeCount& c : r.regimes)
     j["points"].push_back({{"term", c.term}, {"regime", c.regime}, {"points", c.points}});
   j["steps"] = {{"time", r.step_times},

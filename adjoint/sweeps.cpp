@@ -82,9 +82,23 @@ TangentPair advance_tangent(const StepProblem& problem, const VectorXd& u, const
     model.terms[t].tangent(problem.step(), problem.data(t), u, u_old, s_old.data() + at, dir, dr.data(),
                            nullptr);
   }
+  // Nodes that the clock moves pull at the others.
+  const auto moves_clock = [&model](const VectorXd* direction) { return (*direction)[model.clock] != 0; };
+  const bool is_asked = model.clock >= 0 && std::any_of(dir.dnative.begin(), dir.dnative.end(), moves_clock);
+  const VectorXd by_clock = is_asked ? problem.given_by_clock() : VectorXd();
+  Block given;
+  if (by_clock.size() > 0) {
+    const VectorXd pull = problem.hessian_times(u, by_clock);
+    given = Block::Zero(du.rows(), D);
+    for (int k = 0; k < dir.count; ++k) {
+      given.col(k) = (*dnative[k])[model.clock] * by_clock;
+      dr.col(k) += (*dnative[k])[model.clock] * pull;
+    }
+  }
   const MatrixXd dq = factor.solve(-model.to_unknowns(MatrixXd(dr.leftCols(dir.count))));
   TangentPair next{Block::Zero(du.rows(), D), only_lag ? ds : Block::Zero(ds.rows(), D)};
   next.du.leftCols(dir.count) = model.to_displacement(dq);
+  if (given.size() > 0) next.du += given;
   dir.du = next.du.data();
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     if (only_lag && !lags(model.terms[t])) continue;
@@ -107,6 +121,8 @@ VectorXd retreat_adjoint(const StepProblem& problem, const VectorXd& u, const Ch
                                   rhs);
   adj_q = factor.solve(model.to_unknowns(rhs)).col(0);
   const VectorXd adj = model.to_displacement(adj_q);
+  if (const VectorXd by_clock = problem.given_by_clock(); by_clock.size() > 0)
+    native_bar[model.clock] += by_clock.dot(rhs) - problem.hessian_times(u, by_clock).dot(adj);
   VectorXd s_old_bar = VectorXd::Zero(s_bar.size());
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const std::size_t at = model.history_offset(t);

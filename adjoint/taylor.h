@@ -84,7 +84,7 @@ class FunctionalDifference {
 };
 
 /// Rounding and solver noise of Q, measured near x = 0 along `direction`: |Q(h v) − 2 Q(h v/2) + Q(0)| at a
-/// step h so small that nothing else is left, the largest of three. Does not use a gradient. Six evaluations.
+/// step h so small that nothing else is left, the middle one of three. Does not use a gradient. Six evaluations.
 double measure_noise(const FunctionalDifference& functional, const ParameterSpace& space,
                      const VectorXd& direction, const std::function<bool()>& go_on = {});
 

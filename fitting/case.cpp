@@ -6,6 +6,7 @@
 #include <set>
 
 #include "fitting/case_rules.h"
+#include "fitting/colmap.h"
 #include "sim/core/error.h"
 #include "sim/core/units.h"
 #include "sim/scene/load.h"
@@ -50,14 +51,12 @@ class ParameterReader {
  public:
   ParameterReader(const LocatedJson& located, const Scene& scene) : located_(located), scene_(scene) {}
 
-  FitParameter read(std::size_t index) {
+  /// `named` is what its address means (parameters_named).
+  FitParameter read(std::size_t index, const FitParameter& named) {
     const json& item = located_.json["fit"]["parameters"][index];
     pointer_ = "/fit/parameters/" + std::to_string(index);
-    const ParameterSpec spec = described(item["address"].get<std::string>());
-    if (!seen_.insert(spec.address).second)
-      throw InputError(where("address"), shown_text(spec.address) + " a second time", "each parameter once");
-    FitParameter p;
-    p.address = spec.address;
+    const ParameterSpec spec = describe_parameter(scene_, named.address);
+    FitParameter p = named;
     p.lower = quantity(item, "lower", spec), p.upper = quantity(item, "upper", spec);
     p.initial = quantity(item, "initial", spec);
     if (item.contains("prior_sigma")) p.prior_sigma = item["prior_sigma"].get<double>();
@@ -75,17 +74,6 @@ class ParameterReader {
   std::string where(const std::string& key) const {
     const std::string pointer = pointer_ + "/" + key;
     return located_.where(pointer) + ": " + pointer;
-  }
-
-  ParameterSpec described(const std::string& address) const {
-    std::vector<std::string> known;
-    for (const ParameterSpec& spec : all_parameters(scene_)) known.push_back(spec.address);
-    try {
-      return describe_parameter(scene_, address);
-    } catch (const InputError&) {
-      throw InputError(where("address"), shown_json(address),
-                       "in " + scene_.file + " " + expected_parameter(scene_, address));
-    }
   }
 
   std::optional<double> quantity(const json& item, const std::string& key, const ParameterSpec& spec) const {
@@ -127,7 +115,6 @@ class ParameterReader {
   const LocatedJson& located_;
   const Scene& scene_;
   std::string pointer_;
-  std::set<std::string> seen_;
 };
 
 /// "/settings/N" behind the settings that a case has.
@@ -155,13 +142,16 @@ std::string find_or_in_folder(const std::string& given, const std::string& case_
   return (fs::path(folder) / path.filename()).string();
 }
 
-/// A scene where a case is wanted, and values of the scene addressed as if they were the case's: said here,
+/// A scene or an experiment where a case is wanted, and values of the scene addressed as if they were the case's: said here,
 /// since as unknown keys they would only be compared with the keys of cases.
-void refuse_scene(const LocatedJson& written, const std::string& path,
-                  const std::vector<std::string>& settings) {
+void refuse_other_files(const LocatedJson& written, const std::string& path,
+                        const std::vector<std::string>& settings) {
   if (written.json.contains("skin") && !written.json.contains("scene"))
     throw InputError(path, "a scene",
                      "a case, which names its scene (an example: data/scenes/demo/case.json)");
+  if (written.json.contains("variants"))
+    throw InputError(path, "an experiment",
+                     "a case (rhytid study sweep runs experiments; an example: data/scenes/demo/case.json)");
   for (const std::string& setting : settings) {
     const std::vector<std::string> keys =
         split_pointer(std::string_view(setting).substr(0, setting.find('=')), "--set");
@@ -172,10 +162,10 @@ void refuse_scene(const LocatedJson& written, const std::string& path,
   }
 }
 
-/// The scene of the fit. What its messages say to set is set through the case.
-Scene scene_of_fit(const Case& c, const LocatedJson& written) {
+/// The scenes of the fit. What their messages say to set is set through the case.
+std::vector<Scene> scenes_of_fit(const Case& c, const LocatedJson& written) {
   try {
-    return load_scene(c.scene, c.scene_settings);
+    return scenes_of(c);
   } catch (const InputError& error) {
     std::string text = error.what();
     const std::string advice = "e.g. --set /";
@@ -185,11 +175,88 @@ Scene scene_of_fit(const Case& c, const LocatedJson& written) {
   }
 }
 
+/// Scene and settings of a truth; of one without a scene those of the fit come first.
+void read_truth_of(const LocatedJson& located, const std::string& pointer, const json& truth,
+                   const std::string& scene, const std::vector<Setting>& scene_settings,
+                   std::string& truth_scene, std::vector<Setting>& truth_settings) {
+  const bool has_scene = truth.contains("scene");
+  truth_scene = has_scene ? truth["scene"].get<std::string>() : scene;
+  truth_settings = has_scene ? std::vector<Setting>() : scene_settings;
+  for (const Setting& setting : settings_at(located, pointer + "/settings"))
+    truth_settings.push_back(setting);
+}
+
+void read_clips(const LocatedJson& located, Case& c) {
+  const json& root = located.json;
+  for (const char* key : {"footage", "tracks"})
+    if (!root[key].get<std::string>().empty())
+      throw InputError(located.where(std::string("/") + key) + ": /" + key, shown_json(root[key]),
+                       "that each of the clips has its own");
+  for (std::size_t i = 0; i < root["clips"].size(); ++i) {
+    const json& j = root["clips"][i];
+    const std::string pointer = "/clips/" + std::to_string(i);
+    ClipCase clip;
+    clip.name = j["name"];
+    for (const ClipCase& other : c.clips)
+      if (other.name == clip.name)
+        throw InputError(located.where(pointer + "/name") + ": " + pointer + "/name",
+                         shown_text(clip.name) + " a second time", "a name of its own for each clip");
+    clip.scene = j.value("scene", c.scene);
+    clip.scene_settings = c.scene_settings;
+    const std::vector<Setting> own = settings_at(located, pointer + "/settings");
+    clip.scene_settings.insert(clip.scene_settings.end(), own.begin(), own.end());
+    if (j.contains("truth")) {
+      read_truth_of(located, pointer + "/truth", j["truth"], clip.scene, clip.scene_settings,
+                    clip.truth_scene, clip.truth_settings);
+    } else {
+      clip.truth_scene = c.truth_scene;
+      clip.truth_settings = c.truth_settings;
+      clip.truth_settings.insert(clip.truth_settings.end(), own.begin(), own.end());
+    }
+    const auto view = [&](const json& v) {
+      const auto text = [&v](const char* key) { return v.value(key, ""); };
+      return ViewCase{"", v.value("camera", c.camera), text("footage"), text("tracks")};
+    };
+    if (j.contains("cameras"))
+      for (const json& v : j["cameras"]) {
+        clip.views.push_back(view(v));
+        if (j["cameras"].size() > 1) clip.views.back().name = v["name"];
+      }
+    else
+      clip.views.push_back(view(j));
+    c.clips.push_back(std::move(clip));
+  }
+}
+
+void read_parameters(const LocatedJson& located, const std::vector<Scene>& scenes, Case& c) {
+  const json& list = located.json["fit"]["parameters"];
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string pointer = "/fit/parameters/" + std::to_string(i) + "/address";
+    const std::string where = located.where(pointer) + ": " + pointer;
+    for (const FitParameter& named : parameters_named(c, scenes, list[i]["address"], where)) {
+      for (const FitParameter& other : c.fit.parameters)
+        if (other.address == named.address &&
+            (other.clip == named.clip || other.clip.empty() || named.clip.empty()))
+          throw InputError(where, shown_text(named.address) + " a second time", "each parameter once");
+      // Values left open are those of the first scene that has the parameter.
+      const auto knows = [&](std::size_t s) {
+        if (!named.clip.empty()) return c.clips[s].name == named.clip;
+        const auto all = all_parameters(scenes[s]);
+        return std::any_of(all.begin(), all.end(),
+                           [&](const ParameterSpec& spec) { return spec.address == named.address; });
+      };
+      std::size_t first = 0;
+      while (first + 1 < scenes.size() && !knows(first)) ++first;
+      c.fit.parameters.push_back(ParameterReader(located, scenes[first]).read(i, named));
+    }
+  }
+}
+
 }  // namespace
 
 Case load_case(const std::string& path, const std::vector<std::string>& settings) {
   LocatedJson written = read_with_extends(path, case_rule_tree(), "case");
-  refuse_scene(written, path, settings);
+  refuse_other_files(written, path, settings);
   for (const std::string& assignment : settings)
     apply_override(written, {assignment}, path, case_rule_tree());
   const LocatedJson located = resolve_against_rules(written, case_rule_tree());
@@ -199,14 +266,11 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
   c.file = path, c.name = root["name"];
   c.scene = root["scene"], c.scene_settings = settings_at(located, "/settings");
   if (root.contains("truth")) {
-    const json& truth = root["truth"];
-    const bool has_scene = truth.contains("scene");
-    c.truth_scene = has_scene ? truth["scene"].get<std::string>() : c.scene;
-    if (!has_scene) c.truth_settings = c.scene_settings;
-    for (const Setting& setting : settings_at(located, "/truth/settings"))
-      c.truth_settings.push_back(setting);
+    read_truth_of(located, "/truth", root["truth"], c.scene, c.scene_settings, c.truth_scene,
+                  c.truth_settings);
   }
-  c.camera = root.value("camera", "");
+  c.camera = root.value("camera", ""), c.camera_image = root["camera_image"];
+  if (root.contains("camera_unit")) c.camera_unit = root["camera_unit"].get<double>();
   c.footage = root["footage"], c.tracks = root["tracks"];
   c.render = read_render(root["render"]);
   c.track = read_track(root["track"]);
@@ -221,12 +285,12 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
     throw InputError(located.where("/fit/last_frame") + ": /fit/last_frame", std::to_string(c.fit.last_frame),
                      "0 (all frames) or at least first_frame, " + std::to_string(c.fit.first_frame));
 
-  const Scene scene = scene_of_fit(c, written);
-  if (c.name.empty()) c.name = scene.name.empty() ? fs::path(path).stem().string() : scene.name;
-  ParameterReader reader(located, scene);
-  for (std::size_t i = 0; i < root["fit"]["parameters"].size(); ++i)
-    c.fit.parameters.push_back(reader.read(i));
-  check_gauge_layer(located, scene, c.fit.gauge_layer);
+  if (root.contains("clips")) read_clips(located, c);
+  const std::vector<Scene> scenes = scenes_of_fit(c, written);
+  if (c.name.empty())
+    c.name = scenes[0].name.empty() || !c.clips.empty() ? fs::path(path).stem().string() : scenes[0].name;
+  read_parameters(located, scenes, c);
+  for (const Scene& scene : scenes) check_gauge_layer(located, scene, c.fit.gauge_layer);
   return c;
 }
 
@@ -240,7 +304,7 @@ std::string tracks_path(const Case& c, const std::string& folder) {
 }
 
 std::string camera_path(const Case& c, const std::string& folder) {
-  return c.camera.empty() ? (fs::path(folder) / "camera.yaml").string() : c.camera;
+  return c.camera.empty() || is_colmap(c.camera) ? (fs::path(folder) / "camera.yaml").string() : c.camera;
 }
 
 }  // namespace rhytid::fitting

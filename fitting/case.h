@@ -5,7 +5,12 @@
 //   case.json  { "name", "scene": "scene.json", "settings": ["/pointer=value", ...],
 //                "truth": {"scene": "truth.json", "settings": ["/pointer=value", ...]},
 //                "camera": "camera.yaml", "footage": "footage.mp4", "tracks": "tracks.csv",
-//                "render": {...}, "track": {...}, "fit": {"parameters": [{"address", ...}], ...} }
+//                "render": {...}, "track": {...}, "fit": {"parameters": [{"address", ...}], ...},
+//                "clips": [{"name": "left", "settings": [...], "tracks": "left.csv", ...}, ...] }
+//
+// With clips the case names several experiments with the same skin, fitted together: what a clip leaves out
+// it has from the case. A parameter /clips/NAME/time/offset is of that clip, /clips/*/time/offset one for
+// each clip; without such a beginning it is shared by all clips whose scene has it.
 //
 // A truth without a scene of its own is the fit's scene, settings included, changed by the truth's settings.
 // Relative input paths are resolved against the case file; footage and tracks that do not exist there are
@@ -16,6 +21,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sim/scene/located_json.h"
@@ -25,10 +31,11 @@ namespace rhytid::fitting {
 
 /// One fitted parameter; what is not given comes from describe_parameter.
 struct FitParameter {
-  std::string address;
+  std::string address;                          ///< into a scene
   std::optional<double> initial, lower, upper;  ///< internal units
   std::optional<ParameterTransform> transform;
   std::optional<double> prior_sigma;  ///< standard deviation of a Gaussian prior in the transformed parameter
+  std::string clip = {};  ///< of this clip alone; empty: shared by all clips whose scene has the address
 };
 
 struct RenderCase {
@@ -65,26 +72,62 @@ struct FitCase {
   std::string gauge_layer;  ///< layer whose modulus is fixed; default: the innermost
 };
 
+/// What one camera saw of a clip.
+struct ViewCase {
+  std::string name;                     ///< empty where it is the clip's only one
+  std::string camera, footage, tracks;  ///< as those of Case
+};
+
+/// One of several experiments with the same skin.
+struct ClipCase {
+  std::string name;
+  std::string scene;
+  std::vector<Setting> scene_settings;  ///< those of the case, then its own
+  std::string truth_scene;
+  std::vector<Setting> truth_settings;
+  std::vector<ViewCase> views;  ///< at least one
+};
+
 struct Case {
   std::string name, file;
   std::string scene;  ///< path of the scene that the fit uses
   std::vector<Setting> scene_settings;
   std::string truth_scene;  ///< path; empty when the footage is real
   std::vector<Setting> truth_settings;
-  std::string camera;           ///< path of the camera file; empty: the automatic one of `render`
-  std::string footage, tracks;  ///< paths as given
+  std::string camera;                 ///< path of the camera file; empty: the automatic one of `render`
+  std::string camera_image;           ///< when `camera` is COLMAP's: which image it took; empty: the only one
+  std::optional<double> camera_unit;  ///< mm, of COLMAP's unit of length
+  std::string footage, tracks;        ///< paths as given
   RenderCase render;
   TrackCase track;
   FitCase fit;
+  std::vector<ClipCase> clips;  ///< empty: the case is one clip seen by one camera
 };
 
 /// Reads and validates case.json; `settings` are "/pointer=value" overrides of the case itself. The scene is
 /// read too, since addresses and units of fitted parameters are checked against it. Throws InputError.
 Case load_case(const std::string& path, const std::vector<std::string>& settings = {});
 
+/// Fitted parameters that an address as a case or a command line gives it names: itself, that of a clip, or
+/// one for each clip whose scene has it ("/clips/*/..."). `scenes` are those of the clips, in order; one
+/// without clips. Throws InputError beginning with `where`.
+std::vector<FitParameter> parameters_named(const Case& c, const std::vector<Scene>& scenes,
+                                           const std::string& address, const std::string& where);
+
+/// The scenes that a fit of the case runs: one, or one per clip. Throws InputError.
+std::vector<Scene> scenes_of(const Case& c);
+
+/// A view of a clip as a case of its own, as `render` and `track` know it, and where its files lie below the
+/// folder of results: NAME, or NAME/VIEW where several cameras saw the clip.
+Case case_of_view(const Case& c, int clip, int view);
+std::string folder_of_view(const Case& c, int clip, int view, const std::string& folder);
+/// The clip and view that "NAME" or "NAME/VIEW" means. Throws InputError naming what there is.
+std::pair<int, int> view_named(const Case& c, const std::string& name);
+
 /// Where the footage, tracks and camera of a case are: the path given if it exists relative to the case file,
 /// else that file name in `folder` (footage.avi or .mp4, tracks.csv, camera.yaml when the case names none). A
-/// camera that the case names is never looked for elsewhere.
+/// camera that the case names is never looked for elsewhere; for one of COLMAP's, camera.yaml in `folder` is
+/// where fitting/case_camera.h writes it.
 std::string footage_path(const Case& c, const std::string& folder);
 std::string tracks_path(const Case& c, const std::string& folder);
 std::string camera_path(const Case& c, const std::string& folder);

@@ -19,9 +19,25 @@ std::vector<Rule> file_rules() {
        .fallback = nlohmann::json::array(),
        .doc = "Changes of that scene, \"/pointer=value\"."},
       {.pointer = "/settings/*", .type = RuleType::string, .doc = "A change, \"/pointer=value\"."},
-      {.pointer = "/camera", .type = RuleType::path, .doc = "OpenCV camera; default: the automatic one."},
+      {.pointer = "/camera",
+       .type = RuleType::path,
+       .doc = "OpenCV camera (`rhytid calibrate`), or the folder of COLMAP's cameras.txt and images.txt; "
+              "default: "
+              "the automatic one."},
+      {.pointer = "/camera_image",
+       .type = RuleType::string,
+       .fallback = "",
+       .doc = "With COLMAP: the image that the camera took, as in images.txt; default: the only one."},
+      {.pointer = "/camera_unit",
+       .dimension = dimension::length,
+       .min = 0,
+       .min_is_open = true,
+       .doc = "With COLMAP: how long its unit is, which its files do not know."},
       {.pointer = "/footage", .type = RuleType::string, .fallback = "", .doc = "Video file."},
-      {.pointer = "/tracks", .type = RuleType::string, .fallback = "", .doc = "Observations, CSV."},
+      {.pointer = "/tracks",
+       .type = RuleType::string,
+       .fallback = "",
+       .doc = "Observations, tracks.csv; `rhytid convert` makes it of other programs' tables."},
       {.pointer = "/truth", .type = RuleType::object, .doc = "What made the footage of a twin experiment."},
       {.pointer = "/truth/scene", .type = RuleType::path, .doc = "Scene; default: that of the fit."},
       {.pointer = "/truth/settings",
@@ -29,6 +45,63 @@ std::vector<Rule> file_rules() {
        .fallback = nlohmann::json::array(),
        .doc = "Changes of the truth's scene."},
       {.pointer = "/truth/settings/*", .type = RuleType::string, .doc = "A change, \"/pointer=value\"."},
+  };
+}
+
+std::vector<Rule> clip_rules() {
+  const std::string clip = "/clips/*", view = "/clips/*/cameras/*";
+  return {
+      {.pointer = "/clips",
+       .type = RuleType::array,
+       .min = 1,
+       .max = 1000,
+       .doc = "Experiments with the same skin, fitted together. Default: the case is one."},
+      {.pointer = clip,
+       .type = RuleType::object,
+       .doc =
+           "One run of its own; what is left out comes from the case. Its files are looked for and written "
+           "in a folder of its name among the results."},
+      {.pointer = clip + "/name",
+       .type = RuleType::name,
+       .is_required = true,
+       .doc = "Short, for addresses."},
+      {.pointer = clip + "/scene", .type = RuleType::path, .doc = "Scene; default: that of the case."},
+      {.pointer = clip + "/settings",
+       .type = RuleType::array,
+       .fallback = nlohmann::json::array(),
+       .doc = "Changes of the scene, behind those of the case."},
+      {.pointer = clip + "/settings/*", .type = RuleType::string, .doc = "A change, \"/pointer=value\"."},
+      {.pointer = clip + "/camera",
+       .type = RuleType::path,
+       .rival = "cameras",
+       .doc = "OpenCV camera; default: that of the case."},
+      {.pointer = clip + "/footage", .type = RuleType::string, .rival = "cameras", .doc = "Video file."},
+      {.pointer = clip + "/tracks",
+       .type = RuleType::string,
+       .rival = "cameras",
+       .doc = "Observations, CSV."},
+      {.pointer = clip + "/cameras",
+       .type = RuleType::array,
+       .min = 1,
+       .max = 100,
+       .doc = "Where several cameras saw the clip, in step with each other: one entry for each."},
+      {.pointer = view, .type = RuleType::object, .doc = "What one camera saw."},
+      {.pointer = view + "/name", .type = RuleType::name, .is_required = true, .doc = "Of the camera."},
+      {.pointer = view + "/camera", .type = RuleType::path, .doc = "OpenCV camera."},
+      {.pointer = view + "/footage", .type = RuleType::string, .doc = "Video file."},
+      {.pointer = view + "/tracks", .type = RuleType::string, .doc = "Observations, CSV."},
+      {.pointer = clip + "/truth",
+       .type = RuleType::object,
+       .doc = "What made the footage of a twin experiment; default: the truth of the case, with the clip's "
+              "settings."},
+      {.pointer = clip + "/truth/scene", .type = RuleType::path, .doc = "Scene; default: that of the clip."},
+      {.pointer = clip + "/truth/settings",
+       .type = RuleType::array,
+       .fallback = nlohmann::json::array(),
+       .doc = "Changes of the truth's scene."},
+      {.pointer = clip + "/truth/settings/*",
+       .type = RuleType::string,
+       .doc = "A change, \"/pointer=value\"."},
   };
 }
 
@@ -161,7 +234,9 @@ std::vector<Rule> fit_rules() {
       {.pointer = item + "/address",
        .type = RuleType::string,
        .is_required = true,
-       .doc = "Of its value in the scene: /skin/layers/film/youngs_modulus."},
+       .doc =
+           "Of its value in the scene: /skin/layers/film/youngs_modulus. With clips it is shared by all that "
+           "have it; /clips/NAME/time/offset is of one clip, /clips/*/time/offset one for each."},
       {.pointer = item + "/initial",
        .type = RuleType::quantity,
        .doc = "Where the fit starts; default: the value of the scene."},
@@ -234,7 +309,7 @@ by name or number: `/skin/layers/film/youngs_modulus`; what is left out of `fit/
 const std::vector<Rule>& case_rules() {
   static const std::vector<Rule> rules = [] {
     std::vector<Rule> all;
-    for (std::vector<Rule> (*group)() : {&file_rules, &render_rules, &track_rules, &fit_rules})
+    for (std::vector<Rule> (*group)() : {&file_rules, &clip_rules, &render_rules, &track_rules, &fit_rules})
       for (Rule& rule : group()) all.push_back(std::move(rule));
     return all;
   }();

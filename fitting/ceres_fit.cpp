@@ -11,36 +11,35 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// The experiment as one residual block.
+/// The objective as one residual block.
 class ExperimentCost final : public ceres::CostFunction {
  public:
-  ExperimentCost(FitProblem& problem, int max_evaluations)
-      : problem_(problem), max_evaluations_(max_evaluations) {
-    set_num_residuals(problem.num_residuals());
-    mutable_parameter_block_sizes()->push_back(problem.num_parameters());
+  ExperimentCost(Search& search, int max_evaluations) : search_(search), max_evaluations_(max_evaluations) {
+    set_num_residuals(search.num_residuals());
+    mutable_parameter_block_sizes()->push_back(search.num_parameters());
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const VectorXd t = Eigen::Map<const VectorXd>(parameters[0], problem_.num_parameters());
+    const VectorXd t = Eigen::Map<const VectorXd>(parameters[0], search_.num_parameters());
     // Runs are counted by their effect: an evaluation at the kept point costs none.
-    if (problem_.counters().forward_runs >= max_evaluations_ && !(t == last_)) return false;
+    if (search_.forward_runs() >= max_evaluations_ && !(t == last_)) return false;
     last_failed_ = true;
-    const FitEvaluation& evaluation = problem_.evaluate(t);
+    const ObjectiveEvaluation& evaluation = search_.evaluate(t);
     last_ = t;
     if (evaluation.failed) return false;
-    Eigen::Map<VectorXd>(residuals, problem_.num_residuals()) = evaluation.residuals;
+    Eigen::Map<VectorXd>(residuals, search_.num_residuals()) = evaluation.residuals;
     const bool is_accepted = jacobians != nullptr && jacobians[0] != nullptr;
     // A better point is about to be accepted, and Ceres gives up when its Jacobian then cannot be had. So it
     // is formed here already (it is kept), where a failure only refuses the step.
     if (!is_accepted) {
-      last_failed_ = evaluation.cost < accepted_cost_ && !problem_.jacobian(t).has_value();
+      last_failed_ = evaluation.cost < accepted_cost_ && !search_.jacobian(t).has_value();
       return !last_failed_;
     }
-    const std::optional<MatrixXd> jacobian = problem_.jacobian(t);
+    const std::optional<MatrixXd> jacobian = search_.jacobian(t);
     if (!jacobian) return false;
     last_failed_ = false;
     accepted_cost_ = evaluation.cost;
-    Eigen::Map<RowMajor>(jacobians[0], problem_.num_residuals(), problem_.num_parameters()) = *jacobian;
+    Eigen::Map<RowMajor>(jacobians[0], search_.num_residuals(), search_.num_parameters()) = *jacobian;
     gradient_norm_ = (jacobian->transpose() * evaluation.residuals).norm();
     return true;
   }
@@ -52,7 +51,7 @@ class ExperimentCost final : public ceres::CostFunction {
   bool last_failed() const { return last_failed_; }
 
  private:
-  FitProblem& problem_;
+  Search& search_;
   int max_evaluations_;
   mutable VectorXd last_;
   mutable bool last_failed_ = false;
@@ -74,9 +73,9 @@ class QuietLog {
 /// Writes the history and ends the fit when the budget is spent or the user stops it.
 class Recorder final : public ceres::IterationCallback {
  public:
-  Recorder(FitProblem& problem, const ExperimentCost& cost, const VectorXd& t, int max_evaluations,
+  Recorder(Search& search, const ExperimentCost& cost, const VectorXd& t, int max_evaluations,
            const FitIterationCallback& callback, std::vector<FitIteration>& history)
-      : problem_(problem),
+      : search_(search),
         cost_(cost),
         t_(t),
         max_evaluations_(max_evaluations),
@@ -84,21 +83,20 @@ class Recorder final : public ceres::IterationCallback {
         history_(history) {}
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& s) override {
-    const VectorXd values = problem_.parametrisation().values(t_);
     history_.push_back({.iteration = s.iteration,
-                        .evaluations = problem_.counters().forward_runs,
+                        .evaluations = search_.forward_runs(),
                         .cost = s.cost,
                         .gradient_norm = cost_.gradient_norm(),
                         .step_norm = s.step_norm,
                         .seconds = s.cumulative_time_in_seconds,
-                        .values = {values.begin(), values.end()}});
+                        .values = search_.values(t_)});
     if (callback_) callback_(history_.back());
-    const bool is_spent = problem_.counters().forward_runs >= max_evaluations_;
-    return is_spent || problem_.was_stopped() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+    const bool is_spent = search_.forward_runs() >= max_evaluations_;
+    return is_spent || search_.was_stopped() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
   }
 
  private:
-  FitProblem& problem_;
+  Search& search_;
   const ExperimentCost& cost_;
   const VectorXd& t_;
   int max_evaluations_;
@@ -108,20 +106,20 @@ class Recorder final : public ceres::IterationCallback {
 
 }  // namespace
 
-OptimiserOutcome fit_with_ceres(FitProblem& problem, const OptimiserOptions& options,
+OptimiserOutcome fit_with_ceres(Search& search, const OptimiserOptions& options,
                                 const FitIterationCallback& callback) {
   OptimiserOutcome outcome;
-  VectorXd t = problem.parametrisation().initial();
-  const int last_run = problem.counters().forward_runs + options.max_evaluations;
+  VectorXd t = search.initial();
+  const int last_run = search.forward_runs() + options.max_evaluations;
 
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ExperimentCost cost(problem, last_run);
+  ExperimentCost cost(search, last_run);
   ceres::Problem ceres_problem(ownership);
   ceres_problem.AddResidualBlock(&cost, nullptr, t.data());
-  for (int k = 0; k < problem.num_parameters(); ++k) {
-    ceres_problem.SetParameterLowerBound(t.data(), k, problem.parametrisation().lower()[k]);
-    ceres_problem.SetParameterUpperBound(t.data(), k, problem.parametrisation().upper()[k]);
+  for (int k = 0; k < search.num_parameters(); ++k) {
+    ceres_problem.SetParameterLowerBound(t.data(), k, search.lower()[k]);
+    ceres_problem.SetParameterUpperBound(t.data(), k, search.upper()[k]);
   }
 
   ceres::Solver::Options solver;
@@ -138,26 +136,28 @@ OptimiserOutcome fit_with_ceres(FitProblem& problem, const OptimiserOptions& opt
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
   solver.update_state_every_iteration = true;
-  Recorder recorder(problem, cost, t, last_run, callback, outcome.history);
+  Recorder recorder(search, cost, t, last_run, callback, outcome.history);
   solver.callbacks.push_back(&recorder);
   ceres::Solver::Summary summary;
   const QuietLog quiet;
   ceres::Solve(solver, &ceres_problem, &summary);
 
   outcome.detail = summary.message;
-  outcome.t = problem.best().size() > 0 ? problem.best() : problem.parametrisation().initial();
+  const bool found = search.best().size() > 0;
+  outcome.t = search.all(found ? search.best() : search.initial());
+  outcome.cost = found ? search.best_cost() : std::numeric_limits<double>::infinity();
   using Status = OptimiserOutcome::Status;
-  if (problem.was_stopped())
+  if (search.was_stopped())
     outcome.status = Status::stopped;
-  else if (problem.best().size() == 0) {
+  else if (search.best().size() == 0) {
     outcome.status = Status::failed;
-    outcome.detail = "no run could be used: " + problem.last_failure();
+    outcome.detail = "no run could be used: " + search.last_failure();
   } else if (summary.termination_type == ceres::CONVERGENCE && !cost.last_failed())
     outcome.status = Status::converged;
-  else if (problem.counters().forward_runs >= last_run || summary.termination_type == ceres::NO_CONVERGENCE)
+  else if (search.forward_runs() >= last_run || summary.termination_type == ceres::NO_CONVERGENCE)
     outcome.status = Status::max_evaluations;
   else if (cost.last_failed())
-    outcome.detail = "no step from the best point could be run: " + problem.last_failure();
+    outcome.detail = "no step from the best point could be run: " + search.last_failure();
   return outcome;
 }
 

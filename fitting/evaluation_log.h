@@ -21,6 +21,8 @@
 
 namespace rhytid::fitting {
 
+struct FitCase;
+struct FitClip;
 struct FitInput;
 class FitProblem;
 
@@ -31,6 +33,7 @@ using FitIdentity = std::vector<std::pair<std::string, std::string>>;
 /// its budget are not among it, so a fit may be given more evaluations and goes on. Another build of the
 /// program is another program.
 FitIdentity fit_identity(const FitInput& input, const FitProblem& problem);
+FitIdentity fit_identity(const FitClip& clip, const FitCase& options, const FitProblem& problem);
 
 class EvaluationLog {
  public:

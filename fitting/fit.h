@@ -7,8 +7,8 @@
 #include <string>
 
 #include "fitting/case.h"
-#include "fitting/fit_problem.h"
 #include "fitting/fit_result.h"
+#include "fitting/joint_problem.h"
 #include "fitting/optimise.h"
 
 namespace rhytid::fitting {
@@ -27,10 +27,20 @@ struct FitInput {
   bool anew = false;  ///< do not use what the log already holds
 };
 
+/// Several clips, fitted together.
+struct JointFitInput {
+  std::vector<FitClip> clips;
+  FitCase options;
+  std::map<std::string, double> truth = {};  ///< as FitInput::truth, by addresses of the joint problem
+  /// As FitInput::evaluations; of several clips each has a folder of its name in there.
+  std::string evaluations = {};
+  bool anew = false;
+};
+
 struct FitObserver {
   std::function<void(const FitProgress&)> run;         ///< after every forward run
   std::function<void(const FitIteration&)> iteration;  ///< after every iteration of the optimiser
-  std::function<void(const FitProblem&)> registered;   ///< once, before the first run
+  std::function<void(const FitProblem&)> registered;   ///< once per clip, before the first run
   std::function<bool()> should_stop;                   ///< polled inside runs
   std::function<void(const std::string&)> note;        ///< what became of the log of evaluations, one line
 };
@@ -38,6 +48,7 @@ struct FitObserver {
 /// Fits. Fields of the result about files and the case are left to the caller. Throws InputError for a case
 /// that cannot be fitted; a forward model that fails or an optimiser that runs out is a status.
 FitResult run_fit(const FitInput& input, const FitObserver& observer = {});
+FitResult run_fit(const JointFitInput& input, const FitObserver& observer = {});
 
 /// Truth values from the truth.json that `rhytid render` writes: {"parameters": [{"address", "value"}, ...]},
 /// addresses by names, internal units. Addresses that the scene does not have are left out. Throws InputError

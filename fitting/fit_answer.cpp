@@ -60,6 +60,22 @@ std::string layout(const std::vector<Row>& rows) {
   return text;
 }
 
+/// What each clip contributed, camera by camera where it had several.
+std::string clip_table(const FitResult& result) {
+  std::vector<Row> rows = {{"clip", "camera", "frames", "tracks", "observations", "rms px", "chi-square"}};
+  for (const FittedClip& clip : result.clips) {
+    const bool is_single = clip.views.size() == 1;
+    rows.push_back({clip.name, is_single ? clip.views[0].camera : "all", std::to_string(clip.frames),
+                    std::to_string(clip.num_tracks), std::to_string(clip.num_observations),
+                    number(clip.rms_px), number(clip.reduced_chi_square)});
+    if (is_single) continue;
+    for (const FittedView& view : clip.views)
+      rows.push_back({"", view.camera, "", std::to_string(view.num_tracks),
+                      std::to_string(view.num_observations), number(view.rms_px), ""});
+  }
+  return layout(rows);
+}
+
 }  // namespace
 
 std::string answer_text(const FitResult& result) {
@@ -79,6 +95,7 @@ std::string answer_text(const FitResult& result) {
           " forward runs; residual " + number(result.rms_px) + " px rms over " +
           std::to_string(result.num_observations) + " observations of " + std::to_string(result.num_tracks) +
           " tracks, reduced chi-square " + number(result.reduced_chi_square) + ".\n";
+  if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";
   for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";
   return text;

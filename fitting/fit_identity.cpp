@@ -65,11 +65,17 @@ std::string parameters_digest(const FitCase& fit, const Parametrisation& paramet
 }  // namespace
 
 FitIdentity fit_identity(const FitInput& input, const FitProblem& problem) {
+  return fit_identity(FitClip{{}, {}, input.scene, {input.camera}, input.tracks}, input.options, problem);
+}
+
+FitIdentity fit_identity(const FitClip& clip, const FitCase& options, const FitProblem& problem) {
+  std::string cameras;
+  for (const Camera& camera : clip.cameras) cameras += camera_digest(camera);
   return {{"program", program_digest()},
-          {"scene", scene_digest(input.scene, problem)},
-          {"camera", camera_digest(input.camera)},
-          {"tracks", tracks_digest(input.tracks)},
-          {"parameters", parameters_digest(input.options, problem.parametrisation())}};
+          {"scene", scene_digest(clip.scene, problem)},
+          {"camera", cameras},
+          {"tracks", tracks_digest(clip.tracks)},
+          {"parameters", parameters_digest(options, problem.parametrisation())}};
 }
 
 }  // namespace rhytid::fitting

@@ -29,6 +29,30 @@ void check_times(const Track& track, double frame_rate) {
                                          : std::string()));
 }
 
+void require_names(const std::vector<Camera>& cameras, const TrackSet& tracks) {
+  if (cameras.empty()) throw InputError("fit: cameras", "none", "at least one camera");
+  for (std::size_t a = 0; a < cameras.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b)
+      if (cameras[a].name == cameras[b].name)
+        throw InputError("fit: cameras", "two with the name '" + cameras[a].name + "'",
+                         "a name of its own for each");
+  if (cameras.size() < 2) return;  // others' tracks in one file are no error: they are not used
+  for (const Track& track : tracks.tracks)
+    if (std::none_of(cameras.begin(), cameras.end(),
+                     [&](const Camera& camera) { return camera.name == track.camera; }))
+      throw InputError("tracks: track " + std::to_string(track.id), "camera '" + track.camera + "'",
+                       "the name of one of the cameras");
+}
+
+void add(const RegistrationReport& one, RegistrationReport& all) {
+  all.registered += one.registered;
+  all.not_seen += one.not_seen;
+  all.missed_mesh += one.missed_mesh;
+  all.back_side += one.back_side;
+  all.near_rim += one.near_rim;
+  all.not_refined += one.not_refined;
+}
+
 /// The surface that frame 0 shows: at rest, or settled (initial parameters).
 SkinMesh first_frame_mesh(const SceneModel& model, const RunOptions& options) {
   SkinMesh mesh = model.model().mesh;
@@ -45,14 +69,24 @@ SkinMesh first_frame_mesh(const SceneModel& model, const RunOptions& options) {
 }  // namespace
 
 FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& camera, const TrackSet& tracks)
+    : FitProblem(scene, fit, std::vector<Camera>{camera}, tracks) {}
+
+FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector<Camera>& cameras,
+                       const TrackSet& tracks)
     : parametrisation_(scene, fit), model_(parametrisation_.scene(parametrisation_.initial())) {
   options_ = model_.run_options();
   options_.frames = last_used_frame(scene, fit);
   options_.keep_states = true;
   options_.minimiser.polish = true;  // gradients are then exact to the square of the tolerance
   if (options_.frames < 1) throw InputError("fit: frames", "0", "a scene with at least one frame after rest");
-  registration_ = register_tracks(tracks, camera, first_frame_mesh(model_, options_), fit.rim_margin);
-  choose_observations(tracks, fit, camera.name);
+  require_names(cameras, tracks);
+  const SkinMesh seen_first = first_frame_mesh(model_, options_);
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const Registration found = register_tracks(tracks, cameras[c], seen_first, fit.rim_margin);
+    choose_observations(tracks, fit, static_cast<int>(c), found);
+    add(found.report, registration_.report);
+  }
+  require_observations(fit, cameras);
 
   std::vector<adjoint::MaterialPoint> points;
   std::vector<std::vector<int>> points_in_frame(options_.frames + 1);
@@ -65,7 +99,10 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& cam
   if (options_.settle)  // in the order of the tracks, see first_prediction
     for (std::size_t i = 0; i < compared_.size(); ++i) points_in_frame[0].push_back(static_cast<int>(i));
   for (const RegisteredTrack& r : registration_.tracks) points.push_back(r.point);
-  prediction_.emplace(model_.model().mesh, std::move(points), camera, std::move(points_in_frame));
+  std::vector<int> seen_by;
+  for (const ComparedTrack& c : compared_) seen_by.push_back(c.camera);
+  prediction_.emplace(model_.model().mesh, std::move(points), cameras, std::move(seen_by),
+                      std::move(points_in_frame));
   for (int f = 0; f <= options_.frames; ++f) {
     frame_row_.push_back(num_predicted_);
     num_predicted_ += prediction_->size(f);
@@ -75,15 +112,15 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& cam
   for (const FitVariable& v : parametrisation_.variables()) num_residuals_ += v.prior_sigma ? 1 : 0;
 }
 
-void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit, const std::string& camera) {
+void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit, int camera,
+                                     const Registration& found) {
   const int first = std::max(1, fit.first_frame);
   const double floor =
       fit.min_sigma / std::sqrt(2.);  // of the two parts of a displacement's variance, half each
-  std::vector<RegisteredTrack> used;
-  for (const RegisteredTrack& r : registration_.tracks) {
+  for (const RegisteredTrack& r : found.tracks) {
     const Track& track = tracks.tracks[r.track];
     check_times(track, options_.frame_rate);
-    ComparedTrack compared{r.track, track.at(0)->pixel, {}, {}};
+    ComparedTrack compared{r.track, camera, track.at(0)->pixel, {}, {}};
     std::vector<const Observation*> used_observations;
     for (const Observation& o : track.observations) {
       if (o.status != TrackStatus::ok || o.frame < first || o.frame > options_.frames) continue;
@@ -95,13 +132,23 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
     num_observations_ += static_cast<int>(compared.frames.size());
     noise_.emplace_back(track, used_observations, floor, fit.robust_scale);
     compared_.push_back(std::move(compared));
-    used.push_back(r);
+    registration_.tracks.push_back(r);
   }
-  registration_.tracks = std::move(used);
+}
+
+void FitProblem::require_observations(const FitCase& fit, const std::vector<Camera>& cameras) const {
+  std::string names;
+  for (const Camera& camera : cameras) names += (names.empty() ? "'" : ", '") + camera.name + "'";
+  for (std::size_t c = 0; c < cameras.size() && cameras.size() > 1; ++c)
+    if (std::none_of(compared_.begin(), compared_.end(),
+                     [&](const ComparedTrack& t) { return t.camera == static_cast<int>(c); }))
+      throw InputError("fit: tracks of camera '" + cameras[c].name + "'", "no usable observation",
+                       "tracks that are seen in frame 0 on the skin; or leave the camera out");
   if (2 * num_observations_ <= num_parameters())
-    throw InputError("fit: tracks of camera '" + camera + "'",
+    throw InputError("fit: tracks of camera " + names,
                      std::to_string(num_observations_) + " usable observations in frames " +
-                         std::to_string(first) + ".." + std::to_string(options_.frames) + " (" +
+                         std::to_string(std::max(1, fit.first_frame)) + ".." +
+                         std::to_string(options_.frames) + " (" +
                          std::to_string(registration_.report.not_seen) + " tracks not seen in frame 0, " +
                          std::to_string(registration_.report.missed_mesh) + " beside the skin, " +
                          std::to_string(registration_.report.back_side) + " on its back, " +
@@ -159,10 +206,6 @@ void FitProblem::run(const VectorXd& t) {
   progress.seconds = record->seconds;
   progress.replayed = is_replayed;
   counters_.forward_seconds.push_back(progress.seconds);
-  if (!evaluation_.failed) {
-    good_.emplace_back(evaluation_.cost, t);
-    find_best();
-  }
   progress.cost = evaluation_.cost;
   progress.failed = evaluation_.failed;
   progress.failure = evaluation_.failure;
@@ -195,13 +238,12 @@ void FitProblem::fail(const std::string& why) {
   evaluation_.failure = last_failure_ = why;
 }
 
-void FitProblem::find_best() {
-  best_.resize(0);
-  for (const auto& [cost, t] : good_)
-    if (best_.size() == 0 || cost < best_cost_) {
-      best_ = t;
-      best_cost_ = cost;
-    }
+std::vector<Vec3> FitProblem::rest_points() const {
+  const VectorXd rest = VectorXd::Zero(3 * model_.model().mesh.num_nodes());
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < compared_.size(); ++i)
+    points.push_back(prediction_->interpolation().position(static_cast<int>(i), rest));
+  return points;
 }
 
 void FitProblem::compare(const VectorXd& predicted) {
@@ -259,8 +301,6 @@ std::optional<MatrixXd> FitProblem::derivative(EvaluationLog::Kind kind,
   if (!record->failure.empty()) {
     fail(record->failure);
     without_derivative_.insert(bits);
-    std::erase_if(good_, [this](const auto& point) { return point.second == t_; });
-    find_best();
     return std::nullopt;
   }
   if (counted_.insert({kind, bits}).second) {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "fitting/evaluation_log.h"
-#include "fitting/parametrisation.h"
+#include "fitting/objective.h"
 #include "fitting/projected_points.h"
 #include "fitting/registration.h"
 #include "fitting/track_noise.h"
@@ -24,12 +24,7 @@
 
 namespace rhytid::fitting {
 
-/// How well one set of values predicts; failed means that the run did not complete or a point left the view.
-struct FitEvaluation {
-  bool failed = true;
-  std::string failure;  ///< one sentence when failed
-  double cost = 0;
-  VectorXd residuals;                          ///< z [num_residuals]
+struct FitEvaluation : ObjectiveEvaluation {
   std::vector<VectorXd> differences;           ///< per track: observed − predicted [2n], px
   std::vector<TrackNoise::Evaluation> tracks;  ///< per track
 };
@@ -44,15 +39,23 @@ struct FitProgress {
   VectorXd values;  ///< parameters, internal units
 };
 
-class FitProblem {
+class FitProblem final : public Objective {
  public:
   /// Registers the tracks of `camera` and builds the model. `last_frame` 0 and frames beyond the scene's
   /// last end there. Throws InputError when nothing is left to compare or times contradict the frame rate.
   FitProblem(const Scene& scene, const FitCase& fit, const Camera& camera, const TrackSet& tracks);
+  /// Several cameras saw the same clip: each has the tracks that bear its name, all share a run. Throws
+  /// InputError besides when two cameras have one name, a camera has no track that can be compared, or a
+  /// track no camera.
+  FitProblem(const Scene& scene, const FitCase& fit, const std::vector<Camera>& cameras,
+             const TrackSet& tracks);
 
   const Parametrisation& parametrisation() const { return parametrisation_; }
-  int num_parameters() const { return parametrisation_.size(); }
-  int num_residuals() const { return num_residuals_; }
+  const std::vector<FitVariable>& variables() const override { return parametrisation_.variables(); }
+  VectorXd initial() const override { return parametrisation_.initial(); }
+  VectorXd lower() const override { return parametrisation_.lower(); }
+  VectorXd upper() const override { return parametrisation_.upper(); }
+  int num_residuals() const override { return num_residuals_; }
   int num_observations() const { return num_observations_; }  ///< pixels compared (two numbers each)
   int degrees_of_freedom() const;                             ///< independent residuals minus parameters
   int frames() const { return options_.frames; }
@@ -61,14 +64,9 @@ class FitProblem {
   const RunOptions& run_options() const { return options_; }
   const ProjectedPoints& prediction() const { return *prediction_; }
 
-  /// Forward run at t, or the kept one when t is the same to the last bit.
-  const FitEvaluation& evaluate(const VectorXd& t);
-  /// ∂z/∂t [num_residuals][num_parameters]; nothing (and `failure` of the evaluation set) when the run failed
-  /// or cannot be differentiated. A point without derivative counts as failed from then on and is never the
-  /// best.
-  std::optional<MatrixXd> jacobian(const VectorXd& t);
-  /// ∂F/∂t by the adjoint sweep; nothing as above.
-  std::optional<VectorXd> gradient(const VectorXd& t);
+  const FitEvaluation& evaluate(const VectorXd& t) override;
+  std::optional<MatrixXd> jacobian(const VectorXd& t) override;  ///< by the tangent sweep
+  std::optional<VectorXd> gradient(const VectorXd& t) override;  ///< by the adjoint sweep
   /// Residuals and Jacobian whitened with robust weights held fixed, for covariance estimates.
   struct Linearised {
     VectorXd residuals;
@@ -78,12 +76,16 @@ class FitProblem {
 
   /// Compared observations of a track in the order of its differences.
   struct ComparedTrack {
-    int track;   ///< index into the TrackSet
-    Vec2 first;  ///< its pixel in frame 0, where it was attached
+    int track;       ///< index into the TrackSet
+    int camera = 0;  ///< index into cameras()
+    Vec2 first;      ///< its pixel in frame 0, where it was attached
     std::vector<int> frames;
     std::vector<Vec2> observed;
   };
   const std::vector<ComparedTrack>& compared() const { return compared_; }
+  const std::vector<Camera>& cameras() const { return prediction_->cameras(); }
+  /// Rest positions of the points of compared(), mm.
+  std::vector<Vec3> rest_points() const;
   const std::vector<TrackNoise>& noise() const { return noise_; }
 
   struct Counters {
@@ -91,19 +93,20 @@ class FitProblem {
     std::vector<double> forward_seconds, tangent_seconds, adjoint_seconds;
   };
   const Counters& counters() const { return counters_; }
-  /// Why the last failed evaluation failed; empty before one did.
-  const std::string& last_failure() const { return last_failure_; }
-  /// Lowest cost of all evaluations so far and where; empty vector before the first that did not fail.
-  const VectorXd& best() const { return best_; }
-  double best_cost() const { return best_cost_; }
+  const std::string& last_failure() const override { return last_failure_; }
+  int forward_runs() const override { return counters_.forward_runs; }
+
+  std::string name;  ///< of the clip, for messages; empty where it is the only one
 
   std::function<void(const FitProgress&)> on_run;  ///< after every forward run
   std::function<bool()> should_stop;               ///< polled inside runs; true makes the run fail
-  bool was_stopped() const { return was_stopped_; }
+  bool was_stopped() const override { return was_stopped_; }
   EvaluationLog* log = nullptr;  ///< may be null; must outlive the last evaluation
 
  private:
-  void choose_observations(const TrackSet& tracks, const FitCase& fit, const std::string& camera);
+  /// Which observations of the registered tracks of one camera count.
+  void choose_observations(const TrackSet& tracks, const FitCase& fit, int camera, const Registration& found);
+  void require_observations(const FitCase& fit, const std::vector<Camera>& cameras) const;
   void run(const VectorXd& t);
   /// Simulates at t_ and projects: predicted pixels of all frames below one another, [rows][1].
   EvaluationLog::Record simulate_and_project();
@@ -112,7 +115,6 @@ class FitProblem {
                                      int& count, std::vector<double>& seconds);
   void compare(const VectorXd& predicted);
   void fail(const std::string& why);
-  void find_best();
   /// Row of a track's prediction in frame 0; only there when frame 0 is settled.
   Eigen::Index first_prediction(std::size_t compared) const {
     return frame_row_[0] + 2 * static_cast<Eigen::Index>(compared);
@@ -142,9 +144,6 @@ class FitProblem {
   using Bits = std::vector<double>;                            ///< of t
   std::set<std::pair<EvaluationLog::Kind, Bits>> counted_;     ///< evaluations so far
   std::set<Bits> without_derivative_;
-  std::vector<std::pair<double, VectorXd>> good_;  ///< cost and t
-  VectorXd best_;
-  double best_cost_ = 0;
   std::string last_failure_;
   Counters counters_;
   bool was_stopped_ = false;

@@ -1,18 +1,16 @@
 #include "fitting/fit_result.h"
 
+#include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <sstream>
-#include <string_view>
 #include <type_traits>
 
+#include "fitting/residual_table.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
-#include "sim/output/csv.h"
 #include "sim/scene/load.h"
 
 namespace rhytid::fitting {
@@ -63,6 +61,33 @@ void iteration_fields(Archive& field, Record& i) {
 }
 
 template <class Archive, class Record>
+void view_fields(Archive& field, Record& v) {
+  field("camera", v.camera);
+  field("num_tracks", v.num_tracks);
+  field("num_observations", v.num_observations);
+  field("rms_px", v.rms_px);
+  field("footage_file", v.footage_file);
+  field("tracks_file", v.tracks_file);
+  field("camera_file", v.camera_file);
+}
+
+template <class Archive, class Record>
+void clip_fields(Archive& field, Record& c) {
+  field("name", c.name);
+  field("num_tracks", c.num_tracks);
+  field("tracks_left_out", c.tracks_left_out);
+  field("num_observations", c.num_observations);
+  field("frames", c.frames);
+  field("rms_px", c.rms_px);
+  field("cost", c.cost);
+  field("reduced_chi_square", c.reduced_chi_square);
+  field("degrees_of_freedom", c.degrees_of_freedom);
+  field("views", c.views);
+  field("scene_file", c.scene_file);
+  field("fitted_scene_file", c.fitted_scene_file);
+}
+
+template <class Archive, class Record>
 void result_fields(Archive& field, Record& r) {
   field("case_name", r.case_name);
   field("case_file", r.case_file);
@@ -96,6 +121,7 @@ void result_fields(Archive& field, Record& r) {
   field("camera_file", r.camera_file);
   field("settings", r.settings);
   field("fitted_scene_file", r.fitted_scene_file);
+  field.optional("clips", r.clips);
 }
 
 /// JSON has no NaN and no infinity: null and the words "inf", "-inf" stand for them.
@@ -112,6 +138,11 @@ class Writer {
   template <class T>
   void operator()(const char* key, const T& value) {
     out[key] = json(value);
+  }
+  /// A list that files without it leave empty.
+  template <class T>
+  void optional(const char* key, const std::vector<T>& list) {
+    if (!list.empty()) out[key] = json(list);
   }
 
  private:
@@ -142,6 +173,16 @@ class Writer {
     iteration_fields(w, v);
     return std::move(w.out);
   }
+  static Json json(const FittedView& v) {
+    Writer w;
+    view_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const FittedClip& v) {
+    Writer w;
+    clip_fields(w, v);
+    return std::move(w.out);
+  }
   template <class T>
   static Json json(const std::vector<T>& v) {
     Json list = Json::array();
@@ -162,6 +203,11 @@ class Reader {
     const auto found = in_.find(key);
     if (found == in_.end()) throw InputError(where, "nothing", "a value");
     read(*found, value, where);
+  }
+  template <class T>
+  void optional(const char* key, std::vector<T>& list) {
+    list.clear();
+    if (const auto found = in_.find(key); found != in_.end()) read(*found, list, where_ + "/" + key);
   }
 
  private:
@@ -226,6 +272,14 @@ class Reader {
     Reader r(j, where);
     iteration_fields(r, v);
   }
+  static void read(const Json& j, FittedView& v, const std::string& where) {
+    Reader r(j, where);
+    view_fields(r, v);
+  }
+  static void read(const Json& j, FittedClip& v, const std::string& where) {
+    Reader r(j, where);
+    clip_fields(r, v);
+  }
   template <class T>
   static void read(const Json& j, std::vector<T>& v, const std::string& where) {
     if (!j.is_array()) throw InputError(where, j.dump(), "a list");
@@ -254,61 +308,17 @@ void check_sizes(const FitResult& result, const std::string& where) {
   }
 }
 
-const std::vector<CsvColumn>& residual_columns() {
-  static const std::vector<CsvColumn> columns = {
-      {"frame", ""},         {"track", ""},         {"x", "px"},    {"y", "px"},
-      {"predicted_x", "px"}, {"predicted_y", "px"}, {"weight", ""},
-  };
-  return columns;
-}
-
-std::string residual_text(const std::vector<FitResidual>& residuals) {
-  CsvTable table(residual_columns());
-  for (const FitResidual& r : residuals) {
-    table.add_row({std::int64_t{r.frame}, std::int64_t{r.track}, r.x_px, r.y_px, r.predicted_x_px,
-                   r.predicted_y_px, r.weight});
-  }
-  return table.text();
-}
-
-template <class Number>
-Number parse_cell(std::string_view cell, const std::string& where) {
-  Number value{};
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc() || end != cell.data() + cell.size()) {
-    throw InputError(where, "'" + std::string(cell) + "'",
-                     std::is_integral_v<Number> ? "a whole number" : "a number");
-  }
-  return value;
-}
-
-std::vector<FitResidual> parse_residuals(const std::string& text, const std::string& path) {
-  std::istringstream lines(text);
-  std::string line, header = CsvTable(residual_columns()).text();
-  header.pop_back();
-  if (!std::getline(lines, line) || line != header) throw InputError(path + ":1", "'" + line + "'", header);
-  std::vector<FitResidual> residuals;
-  for (int number = 2; std::getline(lines, line); ++number) {
-    const std::string where = path + ":" + std::to_string(number);
-    std::vector<std::string_view> cells;
-    for (std::string_view rest = line;;) {
-      const size_t comma = rest.find(',');
-      cells.push_back(rest.substr(0, comma));
-      if (comma == std::string_view::npos) break;
-      rest.remove_prefix(comma + 1);
-    }
-    if (cells.size() != residual_columns().size()) {
-      throw InputError(where, std::to_string(cells.size()) + " cells",
-                       std::to_string(residual_columns().size()));
-    }
-    const auto real = [&](size_t i) { return parse_cell<double>(cells[i], where); };
-    residuals.push_back({parse_cell<int>(cells[0], where), parse_cell<int>(cells[1], where), real(2), real(3),
-                         real(4), real(5), real(6)});
-  }
-  return residuals;
-}
-
 }  // namespace
+
+std::string FitResult::address_in_clip(const FittedParameter& parameter, int clip) const {
+  const std::string& address = parameter.address;
+  const std::string prefix = "/clips/";
+  if (!address.starts_with(prefix)) return address;
+  const std::size_t end = std::min(address.find('/', prefix.size()), address.size());
+  const bool is_own = clips.empty() || clips[static_cast<std::size_t>(clip)].name ==
+                                           address.substr(prefix.size(), end - prefix.size());
+  return is_own ? address.substr(end) : std::string();
+}
 
 void write_fit_result(const FitResult& result, const std::string& folder) {
   Writer writer;
@@ -318,7 +328,14 @@ void write_fit_result(const FitResult& result, const std::string& folder) {
   // fit.json comes last: where it is, the others are complete.
   if (result.fitted_scene)
     write_file(folder + "/" + result.fitted_scene_file, scene_to_json(*result.fitted_scene).dump(1) + "\n");
-  write_file(folder + "/residuals.csv", residual_text(result.residuals));
+  if (result.fitted_scenes.size() > 1)
+    for (size_t c = 0; c < result.clips.size(); ++c) {
+      const std::filesystem::path path = std::filesystem::path(folder) / result.clips[c].fitted_scene_file;
+      std::error_code ignored;  // write_file says when there is no folder
+      std::filesystem::create_directories(path.parent_path(), ignored);
+      write_file(path.string(), scene_to_json(result.fitted_scenes[c]).dump(1) + "\n");
+    }
+  write_file(folder + "/residuals.csv", residual_text(result));
   write_file(folder + "/fit.json", writer.out.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
@@ -343,7 +360,7 @@ FitResult read_fit_result(const std::string& folder) {
   result_fields(reader, result);
   check_sizes(result, path + ":");
   const std::string csv = folder + "/residuals.csv";
-  result.residuals = parse_residuals(read_file(csv), csv);
+  result.residuals = parse_residuals(read_file(csv), csv, result);
   int num_residuals = 0;
   reader("num_residuals", num_residuals);
   if (num_residuals != static_cast<int>(result.residuals.size())) {

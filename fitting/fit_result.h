@@ -40,6 +40,26 @@ struct FitResidual {
   double x_px = 0, y_px = 0;  ///< observed
   double predicted_x_px = 0, predicted_y_px = 0;
   double weight = 1;  ///< of the robust loss, 1 = full
+  int clip = 0, view = 0;
+};
+
+/// What one camera of a clip contributed.
+struct FittedView {
+  std::string camera;
+  int num_tracks = 0, num_observations = 0;
+  double rms_px = 0;
+  std::string footage_file, tracks_file, camera_file;  ///< as those of FitResult
+};
+
+/// What one of several clips contributed.
+struct FittedClip {
+  std::string name;
+  int num_tracks = 0, tracks_left_out = 0, num_observations = 0, frames = 0;
+  double rms_px = 0, cost = 0;
+  /// |z_c|² over its share of the degrees of freedom, 2 observations − tr(J_c (JᵀJ)⁻¹ J_cᵀ).
+  double reduced_chi_square = 0, degrees_of_freedom = 0;
+  std::vector<FittedView> views;
+  std::string scene_file, fitted_scene_file;  ///< as those of FitResult
 };
 
 struct FitResult {
@@ -69,6 +89,12 @@ struct FitResult {
   /// gauge: a scene file like any other, beside fit.json. Empty when no run succeeded.
   std::string fitted_scene_file;
   std::optional<Scene> fitted_scene;  ///< to be written there; not read back
+  /// Of a fit of several clips or cameras; empty where one camera saw one clip. The files above are then
+  /// those of the first.
+  std::vector<FittedClip> clips;
+  std::vector<Scene> fitted_scenes;  ///< of the clips, to be written; not read back
+  /// The address of a fitted parameter in the scene of a clip; empty when it is another clip's.
+  std::string address_in_clip(const FittedParameter& parameter, int clip) const;
 };
 
 /// fit.json (everything but the following), residuals.csv and the fitted scene in `folder`; each atomically.

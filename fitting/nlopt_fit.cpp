@@ -1,5 +1,6 @@
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <nlopt.hpp>
 
 #include "fitting/optimise.h"
@@ -9,7 +10,7 @@ namespace {
 
 /// F over y with t = start + scale ∘ y, divided by its first value so that tolerances are relative.
 struct ScaledObjective {
-  FitProblem& problem;
+  Search& search;
   const FitIterationCallback& callback;
   VectorXd start, scale;
   double unit = 1;
@@ -20,40 +21,38 @@ struct ScaledObjective {
 
   VectorXd t_of(const std::vector<double>& y) const {
     const VectorXd moved = start + scale.cwiseProduct(Eigen::Map<const VectorXd>(y.data(), y.size()));
-    const Parametrisation& p = problem.parametrisation();
-    return moved.cwiseMax(p.lower()).cwiseMin(p.upper());
+    return moved.cwiseMax(search.lower()).cwiseMin(search.upper());
   }
 
   /// Beyond the feasible region: higher than the best by a slope that leads back to it.
   double wall(const VectorXd& t, std::vector<double>& gradient) {
     last_failed = true;
-    const VectorXd from_best = (t - problem.best()).cwiseQuotient(scale);
+    const VectorXd from_best = (t - search.best()).cwiseQuotient(scale);
     for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k] = 2 * from_best[k];
-    return 2 * problem.best_cost() / unit + 1 + from_best.squaredNorm();
+    return 2 * search.best_cost() / unit + 1 + from_best.squaredNorm();
   }
 
   double operator()(const std::vector<double>& y, std::vector<double>& gradient) {
     const VectorXd t = t_of(y);
-    const FitEvaluation& evaluation = problem.evaluate(t);
-    if (problem.was_stopped()) throw nlopt::forced_stop();
+    const ObjectiveEvaluation& evaluation = search.evaluate(t);
+    if (search.was_stopped()) throw nlopt::forced_stop();
     if (evaluation.failed) return wall(t, gradient);
     const double cost = evaluation.cost;
     double norm = 0;
     if (!gradient.empty()) {
-      const std::optional<VectorXd> g = problem.gradient(t);
+      const std::optional<VectorXd> g = search.gradient(t);
       if (!g) return wall(t, gradient);
       norm = g->norm();
       for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k] = (*g)[k] * scale[k] / unit;
     }
-    const VectorXd values = problem.parametrisation().values(t);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     history.push_back({.iteration = static_cast<int>(history.size()),
-                       .evaluations = problem.counters().forward_runs,
+                       .evaluations = search.forward_runs(),
                        .cost = cost,
                        .gradient_norm = norm,
                        .step_norm = last_t.size() > 0 ? (t - last_t).norm() : 0,
                        .seconds = seconds.count(),
-                       .values = {values.begin(), values.end()}});
+                       .values = search.values(t)});
     last_t = t;
     last_failed = false;
     if (callback) callback(history.back());
@@ -67,22 +66,24 @@ struct ScaledObjective {
 
 }  // namespace
 
-OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& options,
+OptimiserOutcome fit_with_nlopt(Search& search, const OptimiserOptions& options,
                                 const FitIterationCallback& callback) {
   using Status = OptimiserOutcome::Status;
   OptimiserOutcome outcome;
-  outcome.t = problem.parametrisation().initial();
-  const int n = problem.num_parameters();
-  const FitEvaluation& first = problem.evaluate(outcome.t);
-  const std::optional<MatrixXd> jacobian = problem.jacobian(outcome.t);
+  const VectorXd start = search.initial();
+  outcome.t = search.all(start);
+  outcome.cost = std::numeric_limits<double>::infinity();
+  const int n = search.num_parameters();
+  const ObjectiveEvaluation& first = search.evaluate(start);
+  const std::optional<MatrixXd> jacobian = search.jacobian(start);
   if (!jacobian) {
-    outcome.status = problem.was_stopped() ? Status::stopped : Status::failed;
+    outcome.status = search.was_stopped() ? Status::stopped : Status::failed;
     outcome.detail = "the first run failed or could not be differentiated: " + first.failure;
     return outcome;
   }
-  ScaledObjective objective{.problem = problem,
+  ScaledObjective objective{.search = search,
                             .callback = callback,
-                            .start = outcome.t,
+                            .start = start,
                             .scale = VectorXd::Ones(n),
                             .unit = std::max(first.cost, 1e-300),
                             .history = outcome.history};
@@ -94,8 +95,8 @@ OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& opt
   nlopt::opt optimiser(nlopt::LD_SLSQP, n);
   std::vector<double> lower(n), upper(n), y(n, 0.0);
   for (int k = 0; k < n; ++k) {
-    lower[k] = (problem.parametrisation().lower()[k] - outcome.t[k]) / objective.scale[k];
-    upper[k] = (problem.parametrisation().upper()[k] - outcome.t[k]) / objective.scale[k];
+    lower[k] = (search.lower()[k] - start[k]) / objective.scale[k];
+    upper[k] = (search.upper()[k] - start[k]) / objective.scale[k];
   }
   optimiser.set_lower_bounds(lower);
   optimiser.set_upper_bounds(upper);
@@ -124,9 +125,12 @@ OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& opt
   }
   if (outcome.status == Status::converged && objective.last_failed) {
     outcome.status = Status::failed;
-    outcome.detail = "no step from the best point could be run: " + problem.last_failure();
+    outcome.detail = "no step from the best point could be run: " + search.last_failure();
   }
-  outcome.t = problem.best();
+  if (search.best().size() > 0) {
+    outcome.t = search.all(search.best());
+    outcome.cost = search.best_cost();
+  }
   return outcome;
 }
 

@@ -1,13 +1,13 @@
 // The optimisers of a fit: Ceres (Levenberg-Marquardt on the tangent Jacobian) and NLopt (bounded SLSQP on
-// the adjoint gradient). Both minimise the same F(t) of FitProblem within its bounds.
+// the adjoint gradient). Both minimise the same F(t) of an objective within its bounds.
 // Tests: tests/fitting/fit_test.cpp
 #pragma once
 
 #include <functional>
 #include <string>
 
-#include "fitting/fit_problem.h"
 #include "fitting/fit_result.h"
+#include "fitting/search.h"
 
 namespace rhytid::fitting {
 
@@ -23,21 +23,22 @@ struct OptimiserOutcome {
   enum class Status { converged, max_evaluations, stopped, failed };
   Status status = Status::failed;
   std::string detail;  ///< a sentence
-  VectorXd t;          ///< the best point seen; the start when every run failed
+  VectorXd t;          ///< the best point seen, all parameters; the start when every run failed
+  double cost = 0;     ///< F there; infinite when every run failed
   std::vector<FitIteration> history;
 };
 
 /// Called after every accepted or rejected iteration of the optimiser.
 using FitIterationCallback = std::function<void(const FitIteration&)>;
 
-/// One Ceres cost function for the whole experiment: the Jacobian is formed only when asked for, a failed
+/// One Ceres cost function for the whole objective: the Jacobian is formed only when asked for, a failed
 /// forward run shrinks the trust region.
-OptimiserOutcome fit_with_ceres(FitProblem& problem, const OptimiserOptions& options,
+OptimiserOutcome fit_with_ceres(Search& search, const OptimiserOptions& options,
                                 const FitIterationCallback& callback = {});
 
 /// SLSQP over variables scaled by the initial Jacobian's column norms; a failed run counts as a wall that
 /// pushes back to the best point.
-OptimiserOutcome fit_with_nlopt(FitProblem& problem, const OptimiserOptions& options,
+OptimiserOutcome fit_with_nlopt(Search& search, const OptimiserOptions& options,
                                 const FitIterationCallback& callback = {});
 
 }  // namespace rhytid::fitting

@@ -6,9 +6,21 @@ namespace rhytid::fitting {
 
 ProjectedPoints::ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points,
                                  Camera camera, std::vector<std::vector<int>> points_in_frame)
+    : ProjectedPoints(mesh, points, std::vector<Camera>{std::move(camera)},
+                      std::vector<int>(points.size(), 0), std::move(points_in_frame)) {}
+
+ProjectedPoints::ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points,
+                                 std::vector<Camera> cameras, std::vector<int> camera_of_point,
+                                 std::vector<std::vector<int>> points_in_frame)
     : interpolation_(mesh, std::move(points)),
-      camera_(std::move(camera)),
+      cameras_(std::move(cameras)),
+      camera_of_point_(std::move(camera_of_point)),
       points_in_frame_(std::move(points_in_frame)) {
+  require(static_cast<int>(camera_of_point_.size()) == interpolation_.num_points(),
+          "ProjectedPoints: one camera per point");
+  for (const int camera : camera_of_point_)
+    require(camera >= 0 && camera < static_cast<int>(cameras_.size()),
+            "ProjectedPoints: camera index out of range");
   for (const std::vector<int>& list : points_in_frame_)
     for (const int i : list)
       require(i >= 0 && i < interpolation_.num_points(), "ProjectedPoints: point index out of range");
@@ -27,7 +39,7 @@ VectorXd ProjectedPoints::values(int frame, const State& state) const {
   VectorXd out(size(frame));
   Eigen::Index row = 0;
   for (const int i : points_in(frame)) {
-    out.segment<2>(row) = camera_.project(interpolation_.position(i, state.u));
+    out.segment<2>(row) = camera_of(i).project(interpolation_.position(i, state.u));
     row += 2;
   }
   return out;
@@ -38,7 +50,7 @@ MatrixXd ProjectedPoints::tangent(int frame, const State& state, const MatrixXd&
   Eigen::Index row = 0;
   for (const int i : points_in(frame)) {
     out.middleRows<2>(row) =
-        camera_.projection_jacobian(interpolation_.position(i, state.u)) * interpolation_.tangent(i, du);
+        camera_of(i).projection_jacobian(interpolation_.position(i, state.u)) * interpolation_.tangent(i, du);
     row += 2;
   }
   return out;
@@ -48,7 +60,7 @@ void ProjectedPoints::adjoint(int frame, const State& state, const VectorXd& wei
                               VectorXd&) const {
   Eigen::Index row = 0;
   for (const int i : points_in(frame)) {
-    const auto jacobian = camera_.projection_jacobian(interpolation_.position(i, state.u));
+    const auto jacobian = camera_of(i).projection_jacobian(interpolation_.position(i, state.u));
     interpolation_.adjoint(i, jacobian.transpose() * weights.segment<2>(row), u_bar);
     row += 2;
   }

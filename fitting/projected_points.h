@@ -11,12 +11,16 @@
 
 namespace rhytid::fitting {
 
-/// Pixels of chosen points in chosen frames; values are [x0 y0 x1 y1 ...] in the order of the frame's list.
+/// Pixels of chosen points in chosen frames, each point as one camera sees it; values are [x0 y0 x1 y1 ...] in the order of the frame's list.
 class ProjectedPoints final : public adjoint::Output {
  public:
   /// `points_in_frame[f]` lists indices of `points` wanted in frame f; frames beyond the list want none.
   /// Throws ContractError on indices out of range.
   ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points, Camera camera,
+                  std::vector<std::vector<int>> points_in_frame);
+  /// The same with several cameras: `camera_of_point` [points] indexes them.
+  ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points,
+                  std::vector<Camera> cameras, std::vector<int> camera_of_point,
                   std::vector<std::vector<int>> points_in_frame);
 
   int size(int frame) const override;
@@ -27,13 +31,16 @@ class ProjectedPoints final : public adjoint::Output {
                VectorXd& s_bar) const override;
 
   const adjoint::PointInterpolation& interpolation() const { return interpolation_; }
-  const Camera& camera() const { return camera_; }
+  const std::vector<Camera>& cameras() const { return cameras_; }
   /// The list given for a frame; empty beyond.
   const std::vector<int>& points_in(int frame) const;
 
  private:
+  const Camera& camera_of(int point) const { return cameras_[camera_of_point_[point]]; }
+
   adjoint::PointInterpolation interpolation_;
-  Camera camera_;
+  std::vector<Camera> cameras_;
+  std::vector<int> camera_of_point_;
   std::vector<std::vector<int>> points_in_frame_;
 };
 

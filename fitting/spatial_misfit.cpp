@@ -34,18 +34,29 @@ MatrixXd gaussian(const MatrixXd& distances, double length) {
   return (-0.5 * (distances.array() / length).square()).exp().matrix();
 }
 
-MatrixXd distances_of(const std::vector<Vec2>& pixels) {
-  const auto n = static_cast<Eigen::Index>(pixels.size());
-  MatrixXd d(n, n);
+struct Distances {
+  MatrixXd all;
+  double largest = 0;  ///< within clips
+};
+
+/// Between clips so far that no field and no kernel reaches.
+Distances distances_of(const std::vector<const WhitenedTrack*>& tracks) {
+  const auto n = static_cast<Eigen::Index>(tracks.size());
+  Distances d{MatrixXd::Zero(n, n)};
+  const auto within = [&](Eigen::Index i, Eigen::Index j) { return tracks[i]->clip == tracks[j]->clip; };
   for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j) d(i, j) = (pixels[i] - pixels[j]).norm();
+    for (Eigen::Index j = 0; j < n; ++j)
+      if (within(i, j)) d.all(i, j) = (tracks[i]->place - tracks[j]->place).norm();
+  d.largest = n > 0 ? d.all.maxCoeff() : 0;
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j)
+      if (!within(i, j)) d.all(i, j) = 1e3 * d.largest;
   return d;
 }
 
 /// Typical distance to the nearest other track.
-double spacing_of(const MatrixXd& distances) {
+double spacing_of(const MatrixXd& distances, double farthest) {
   std::vector<double> nearest;
-  const double farthest = distances.maxCoeff();
   for (Eigen::Index i = 0; i < distances.rows(); ++i) {
     double least = farthest;
     for (Eigen::Index j = 0; j < distances.cols(); ++j)
@@ -93,7 +104,6 @@ SpatialMisfit::SpatialMisfit(const std::vector<WhitenedTrack>& tracks, const Mat
   const OneThread one_thread;
   const std::size_t every = (tracks.size() + kMostTracks - 1) / kMostTracks;
   std::vector<const WhitenedTrack*> used;
-  std::vector<Vec2> pixels;
   int num_rows = 0;
   for (std::size_t i = 0; i < tracks.size(); i += every) {
     const WhitenedTrack& t = tracks[i];
@@ -101,12 +111,11 @@ SpatialMisfit::SpatialMisfit(const std::vector<WhitenedTrack>& tracks, const Mat
                 t.residuals.size() == t.jacobian.rows() && t.jacobian.cols() == basis.rows(),
             "SpatialMisfit: rows and parameters of a track");
     used.push_back(&t);
-    pixels.push_back(t.pixel);
     for (const int row : t.rows) num_rows = std::max(num_rows, row + 1);
   }
   const auto n = static_cast<Eigen::Index>(used.size());
-  const MatrixXd distances = distances_of(pixels);
-  if (rank_ == 0 || n <= rank_ || !(distances.maxCoeff() > 0)) return;
+  const Distances distances = distances_of(used);
+  if (rank_ == 0 || n <= rank_ || !(distances.largest > 0)) return;
 
   // Of fewer tracks A is not 1: their coordinates are own ones.
   to_own_ = MatrixXd::Identity(rank_, rank_);
@@ -131,8 +140,8 @@ SpatialMisfit::SpatialMisfit(const std::vector<WhitenedTrack>& tracks, const Mat
       seen_(i, row) = 1;
     }
   }
-  fit_reference(distances);
-  choose_kernel(distances);
+  fit_reference(distances.all, distances.largest);
+  choose_kernel(distances.all, distances.largest);
 }
 
 MatrixXd SpatialMisfit::smoothed_jacobian(const MatrixXd& weights) const {
@@ -150,9 +159,9 @@ MatrixXd SpatialMisfit::weighted_normal(const MatrixXd& weights) const {
   return sum;
 }
 
-void SpatialMisfit::fit_reference(const MatrixXd& distances) {
+void SpatialMisfit::fit_reference(const MatrixXd& distances, double largest) {
   const Eigen::Index n = distances.rows();
-  const double largest = distances.maxCoeff(), spacing = spacing_of(distances);
+  const double spacing = spacing_of(distances, largest);
   // The diagonal, then rings of distances.
   Eigen::MatrixXi bin = (distances * (kBins / (kFarthest * largest))).cast<int>().array() + 1;
   bin.diagonal().setZero();
@@ -207,10 +216,10 @@ MatrixXd SpatialMisfit::expected_sum(const MatrixXd& kernel) const {
   return 0.5 * (sum + sum.transpose());
 }
 
-void SpatialMisfit::choose_kernel(const MatrixXd& distances) {
+void SpatialMisfit::choose_kernel(const MatrixXd& distances, double largest) {
   double least = std::numeric_limits<double>::infinity();
   MatrixXd expected;
-  for (const double length : lengths(0.7 * spacing_of(distances), kFarthest * distances.maxCoeff(), 1.25)) {
+  for (const double length : lengths(0.7 * spacing_of(distances, largest), kFarthest * largest, 1.25)) {
     const MatrixXd kernel = gaussian(distances, length);
     const MatrixXd sum = expected_sum(kernel);
     const Eigen::LLT<MatrixXd> factor(sum);

@@ -18,6 +18,9 @@
 // average if Σ is, and a variance gᵀA⁻¹CBCᵀA⁻¹g has as many degrees of freedom as its mean and variance under
 // Σ tell (Satterthwaite 1946). L is where tr(E⁻¹B_0) is least: the least depends on Σ there.
 //
+// Errors of different clips are independent: K and Σ are zero between them, so B is a sum over clips, while A
+// and M are those of all clips together.
+//
 // Only the shape of Σ matters, not its size. The last two steps are what makes intervals hold on patches that
 // are narrow or small against the length over which errors are alike; fitting/README.md has the figures.
 // Tests: tests/fitting/spatial_misfit_test.cpp
@@ -31,11 +34,12 @@ namespace rhytid::fitting {
 
 /// One track, whitened, at the optimum.
 struct WhitenedTrack {
-  Vec2 pixel;             ///< in frame 0
+  Vec3 place;             ///< mm at rest; or px in frame 0 (third 0) where one camera saw all
   std::vector<int> rows;  ///< which quantities its rows are: the same number in another track is the same
                           ///< frame and axis; not negative
   MatrixXd jacobian;      ///< [rows][parameters]
   VectorXd residuals;     ///< [rows]
+  int clip = 0;           ///< errors of different clips are independent
 };
 
 /// The corrected sandwich in coordinates in which A is the identity.
@@ -50,15 +54,16 @@ class SpatialMisfit {
   const MatrixXd& covariance() const { return covariance_; }
   /// Degrees of freedom of gᵀ covariance() g, g [rank]; at least one.
   double degrees(const VectorXd& g) const;
-  double kernel_width() const { return kernel_width_; }  ///< L, px; 0 = no statement
+  double kernel_width() const { return kernel_width_; }  ///< L, in the unit of places; 0 = no statement
 
  private:
   /// Σ_k weights_ik J_k in the rows in which track i is seen, laid out as jacobian_.
   MatrixXd smoothed_jacobian(const MatrixXd& weights) const;
   /// Σ_ij weights_ij J_iᵀ J_j over the rows in which both are seen [rank][rank].
   MatrixXd weighted_normal(const MatrixXd& weights) const;
-  void fit_reference(const MatrixXd& distances);
-  void choose_kernel(const MatrixXd& distances);
+  /// `largest` of the distances within clips.
+  void fit_reference(const MatrixXd& distances, double largest);
+  void choose_kernel(const MatrixXd& distances, double largest);
   /// Σ over pairs (i, j) of `kernel` times E[s_i s_jᵀ].
   MatrixXd expected_sum(const MatrixXd& kernel) const;
 

@@ -247,6 +247,16 @@ void add_parameters(HtmlPage& page, const CertificateReport& r) {
   }
 }
 
+void add_not_smooth(HtmlPage& page, const CertificateReport& r) {
+  if (r.not_smooth.empty()) return;
+  page.heading("Not tested");
+  page.paragraph(
+      "Results have a kink in these here: a path changes its speed at a knot where a step ends, or within "
+      "0.1 ms of "
+      "that, which a Taylor test would step over. Exactly there the derivative is the mean of both sides.");
+  page.list(r.not_smooth);
+}
+
 void add_origin(HtmlPage& page, const CertificateReport& r, const SceneModel& scene_model,
                 const CertificateOrigin& origin) {
   page.section("run", "How this was made");
@@ -322,6 +332,7 @@ std::string certificate_page(const CertificateReport& report, const SceneModel& 
     if (c.name == "pivots") dip = c.threshold;
   add_steps(page, report, dip);
   add_parameters(page, report);
+  add_not_smooth(page, report);
   add_origin(page, report, scene_model, origin);
   return page.finish();
 }

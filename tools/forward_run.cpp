@@ -12,6 +12,7 @@
 #include "sim/terms/kernel_table.h"
 #include "tools/earlier_run.h"
 #include "tools/run_checkpoint.h"
+#include "tools/run_observer.h"
 #include "tools/run_record.h"
 #include "tools/scene_argument.h"
 #include "tools/step_table.h"
@@ -56,12 +57,8 @@ class ForwardRun {
 
     context_.progress.stage("simulate", scene.time.frames * scene.time.substeps);
     if (options.frames_done > 0) context_.progress.step_done(options.frames_done * scene.time.substeps);
-    RunObserver observer;
+    RunObserver observer = progress_observer(context_.progress);
     observer.step = [&](const StepEvent& event) { keep(event); };
-    observer.iteration = [&](int, double, int iteration, double, double residual) {
-      context_.progress.iteration(iteration, residual);
-      return !context_.progress.interrupted();
-    };
     solve_started_ = now();
     cpu_started_ = cpu_now();
     const Trajectory run = simulate(scene_model_.model(), scene_model_.native(), options, observer, &start);

@@ -51,7 +51,7 @@ std::vector<PictureSolid> collider_solids(const Scene& scene, double t) {
   std::vector<PictureSolid> solids;
   for (const ColliderScene& c : scene.colliders) {
     if (c.shape == ShapeKind::plane) continue;
-    const BodyPose pose = ColliderMotion(c).at(t);
+    const BodyPose pose = ColliderMotion(c, scene.time.offset).at(t);
     const Vec3 half =
         pose.rotation * (c.shape == ShapeKind::capsule ? 0.5 * c.length : 0) * c.axis.normalized();
     if (c.shape == ShapeKind::ellipsoid) {

@@ -87,7 +87,7 @@ void review_collider(const SceneModel& scene_model, const ColliderScene& collide
   const SkinMesh& mesh = scene_model.model().mesh;
   const TimeScene& time = scene_model.scene().time;
   if (time.frames == 0) return;
-  const ColliderMotion motion(collider);
+  const ColliderMotion motion(collider, time.offset);
   const auto shape = collider_shape(collider);
   const std::string at = "collider " + collider.name;
   double rest_gap = std::numeric_limits<double>::infinity(), smallest = rest_gap, rim_distance = rest_gap;
@@ -181,6 +181,19 @@ std::vector<std::string> review_ligaments(const SceneModel& scene_model) {
 }
 
 /// The gap at rest is subtracted: bone that lies lower than the skin acts as if it touched.
+/// Held parts rest in frame 0 whatever the offset of the clock, and begin where their paths are then.
+void review_held(const SceneModel& scene_model, std::vector<std::string>& warnings) {
+  const TimeScene& time = scene_model.scene().time;
+  if (time.frames == 0 || scene_model.run_options().settle) return;
+  const VectorXd given = scene_model.model().given_displacement(time.offset);
+  const double jump = given.size() > 0 ? given.cwiseAbs().maxCoeff() : 0;
+  if (jump > 0)
+    warnings.push_back(
+        "/time/offset: held parts rest in frame 0 and are " + length_text(jump) +
+        " away at the first moment of the first step, which no smaller step can divide; let their "
+        "paths begin later, or move the knots instead of the clock");
+}
+
 void review_base(const SceneModel& scene_model, std::vector<std::string>& warnings) {
   const Scene& scene = scene_model.scene();
   // Where a plane lies says nothing: most scenes leave it at the origin.
@@ -200,6 +213,7 @@ void review_base(const SceneModel& scene_model, std::vector<std::string>& warnin
 std::vector<std::string> review_scene(const SceneModel& scene_model, const StepCost& cost) {
   std::vector<std::string> warnings;
   review_moduli(scene_model.scene(), warnings);
+  review_held(scene_model, warnings);
   review_base(scene_model, warnings);
   review_support(scene_model, cost, warnings);
   review_wrinkles(scene_model, warnings);

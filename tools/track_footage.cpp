@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <ostream>
 
+#include "fitting/case_camera.h"
 #include "fitting/tracking/overlay.h"
 #include "fitting/tracking/there_and_back.h"
 #include "sim/core/digest.h"
@@ -140,7 +141,7 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
       is_truth_of(in(folder, "truth.json"), job.footage.path, ""))
     job.truth_motion = motion;
 
-  const std::string path = fitting::camera_path(c, folder);
+  const std::string path = fitting::case_camera_file(c, folder);
   if (c.camera.empty() && !fs::exists(path)) {
     progress.warning("no camera: tracks are not limited to the skin and the finger is not masked");
   } else {

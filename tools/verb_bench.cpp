@@ -10,14 +10,17 @@ namespace {
 
 class Bench : public Verb {
  public:
+  explicit Bench(std::vector<std::unique_ptr<Benchmark>> benchmarks) : benchmarks_(std::move(benchmarks)) {}
+
   VerbHelp help() const override {
     return {"bench",
             "benchmarks of the simulator: stability, stages, kernels, features, gradients, tolerances, "
             "memory, minimisers, errors "
-            "against time",
+            "against time, and of fits (in rhytid): recovery",
             "Runs one benchmark and writes its tables. `stability` takes every setting to its extremes on a "
             "small scene, `kernels` compares the element kernels with plain ones, `pareto` runs an "
-            "experiment file; the others measure a drag over a patch of any "
+            "experiment file, `recovery` repeats twin experiments of cases; the others measure a drag over a "
+            "patch of any "
             "size, or a scene of yours (--scene).",
             "nothing",
             "tables (CSV, Markdown) into -o DIR, and a short account on stdout",
@@ -59,15 +62,19 @@ class Bench : public Verb {
   }
 
  private:
-  std::vector<std::unique_ptr<Benchmark>> benchmarks_ = make_benchmarks();
+  std::vector<std::unique_ptr<Benchmark>> benchmarks_;
   Benchmark* chosen_ = nullptr;
   std::string output_, unknown_;
 };
 
 }  // namespace
 
+std::unique_ptr<Verb> make_bench_verb(std::vector<std::unique_ptr<Benchmark>> benchmarks) {
+  return std::make_unique<Bench>(std::move(benchmarks));
+}
+
 std::unique_ptr<Verb> make_verb_bench() {
-  return std::make_unique<Bench>();
+  return make_bench_verb(make_benchmarks());
 }
 
 }  // namespace rhytid::tools

@@ -36,7 +36,7 @@ class Certify : public Verb {
   void add_options(CLI::App& app) override {
     app.add_option("--parameters", addresses_,
                    "addresses to differentiate by, as /ligaments/stiffness,... (default: all that have an "
-                   "effect)")
+                   "effect; left out where results have a kink in them)")
         ->delimiter(',')
         ->option_text("ADDRESS,...");
     app.add_flag("--thorough", thorough_, "a Taylor test of every parameter on its own");
@@ -88,7 +88,10 @@ class Certify : public Verb {
     write_file(folder + "/certificate.html",
                certificate_page(report, scene_model, {points_, seed_, command(context)}));
     context.out << text;
-    if (report.interrupted) return ExitCode::interrupted;
+    if (report.interrupted) {
+      progress.note("interrupted; the checks so far are kept, the same command starts over");
+      return ExitCode::interrupted;
+    }
     return report.passed() ? ExitCode::ok : ExitCode::not_converged;
   }
 

@@ -56,7 +56,7 @@ struct Findings {
   double picture_seconds = 0;  ///< per frame that is written
   std::vector<std::string> warnings;
 
-  explicit Findings(const SceneModel& built)
+  Findings(const SceneModel& built, double program_memory)
       : scene_model(built),
         size(model_size(built)),
         cost(measure_step_cost(built)),
@@ -65,6 +65,7 @@ struct Findings {
         edges(surface_edge_lengths(built.model().mesh.surface)),
         picture_seconds(built.scene().output.pictures ? measure_pictures(built, {}) : 0),
         warnings(scene_warnings(built.scene())) {
+    memory.program = program_memory;
     const std::vector<std::string> more = review_scene(built, cost);
     warnings.insert(warnings.end(), more.begin(), more.end());
   }
@@ -72,10 +73,17 @@ struct Findings {
     const Scene& scene = scene_model.scene();
     return scene.output.pictures ? 1 + (scene.time.frames + scene.output.every - 1) / scene.output.every : 0;
   }
-  int steps() const { return scene_model.scene().time.frames * scene_model.scene().time.substeps; }
-  double run_seconds() const {
-    return cost.analysis_seconds + steps() * expected_iterations * cost.iteration_seconds();
+  int steps() const {
+    const TimeScene& time = scene_model.scene().time;
+    return time.frames * time.substeps + (scene_model.run_options().settle ? 1 : 0);
   }
+  /// Over the lag, of which there is one where nothing lags.
+  int passes() const {
+    const auto& terms = scene_model.model().terms;
+    const auto lags = [](const Term& term) { return term.kernels().history_is_lag; };
+    return std::any_of(terms.begin(), terms.end(), lags) ? scene_model.scene().time.lag_passes : 1;
+  }
+  double run_seconds() const { return cost.analysis_seconds + steps() * cost.step_seconds(passes()); }
 };
 
 ordered_json to_json(const Findings& f) {
@@ -143,6 +151,8 @@ ordered_json to_json(const Findings& f) {
                    {"residual_s", f.cost.residual_seconds},
                    {"hessian_s", f.cost.hessian_seconds},
                    {"factorisation_s", f.cost.factor_seconds},
+                   {"solve_s", f.cost.solve_seconds},
+                   {"step_s", f.cost.step_seconds()},
                    {"analysis_s", f.cost.analysis_seconds},
                    {"run_s", f.run_seconds()},
                    {"pictures_s", f.pictured_frames() * f.picture_seconds},
@@ -151,6 +161,8 @@ ordered_json to_json(const Findings& f) {
                      {"matrix", f.memory.matrix},
                      {"factor", f.memory.factor},
                      {"states", f.memory.states},
+                     {"elements", f.memory.elements},
+                     {"program", f.memory.program},
                      {"total", f.memory.total()}}},
                    {"resident_MB", resident_memory_mb()}};
   j["warnings"] = f.warnings;
@@ -227,11 +239,13 @@ void print(const Findings& f, std::ostream& out) {
   for (const FeatureNote& n : f.scene_model.features())
     lines.row(n.feature, (n.present ? "yes: " : "left out: ") + n.detail);
   const bool settles = f.scene_model.run_options().settle;
-  lines.row("residual at rest",
-            f.cost.rest_residual == 0
-                ? "0 N, exactly an equilibrium"
-                : number_text(f.cost.rest_residual) +
-                      (settles ? " N, from which the skin settles before frame 0" : " N"));
+  lines.row(
+      "residual at rest",
+      f.cost.rest_residual == 0 ? "0 N, exactly an equilibrium"
+      : !std::isfinite(f.cost.rest_residual)
+          ? "none: an element is inverted or a point behind the bone where the run starts; it cannot start so"
+          : number_text(f.cost.rest_residual) +
+                (settles ? " N, from which the skin settles before frame 0" : " N"));
   if (f.wrinkles)
     lines.row("wrinkles", f.wrinkles->film + " on " + f.wrinkles->soft + ": wavelength " +
                               format_quantity(f.wrinkles->wavelength, dimension::length, 3) +
@@ -247,13 +261,16 @@ void print(const Findings& f, std::ostream& out) {
             number_text(f.memory.total(), "%.0f MB") + ": model " + number_text(f.memory.model, "%.0f") +
                 ", matrix " + number_text(f.memory.matrix, "%.0f") + ", factor " +
                 number_text(f.memory.factor, "%.0f") + ", states " + number_text(f.memory.states, "%.0f") +
-                "; this check holds " + number_text(resident_memory_mb(), "%.0f MB"));
+                ", elements " + number_text(f.memory.elements, "%.0f") + ", program " +
+                number_text(f.memory.program, "%.0f") + "; this check holds " +
+                number_text(resident_memory_mb(), "%.0f MB"));
   lines.row("one iteration", seconds_text(f.cost.iteration_seconds()) + ": residual " +
                                  seconds_text(f.cost.residual_seconds) + ", Hessian " +
                                  seconds_text(f.cost.hessian_seconds) + ", factorisation " +
                                  seconds_text(f.cost.factor_seconds));
   lines.row("run", "about " + seconds_text(f.run_seconds()) + ": " + std::to_string(f.steps()) + " steps x " +
-                       std::to_string(expected_iterations) + " iterations");
+                       (f.passes() > 1 ? std::to_string(f.passes()) + " passes x " : "") +
+                       std::to_string(expected_iterations) + " iterations, on cores of its own");
   if (f.pictured_frames() > 0)
     lines.row("pictures", "about " + seconds_text(f.pictured_frames() * f.picture_seconds) +
                               " more: 2 of each of " + std::to_string(f.pictured_frames()) +
@@ -324,8 +341,9 @@ class Check : public Verb {
       }
       return ExitCode::ok;
     }
+    const double program_memory = resident_memory_mb();  // before anything is built
     const SceneModel scene_model(std::move(scene));
-    const Findings findings(scene_model);
+    const Findings findings(scene_model, program_memory);
     if (as_json_) {
       context.out << to_json(findings).dump(2) << '\n';
     } else {

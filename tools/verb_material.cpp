@@ -217,7 +217,10 @@ class Material : public Verb {
     }
     const double hold = duration(hold_, "--hold", 0), step = duration(step_, "--step", 1. / 24);
     if (!(step > 0) || (ramp + hold) / step > 1e6)
-      throw InputError("--step", step_, "a time that gives at most a million steps");
+      throw InputError(step_.empty() ? "--hold" : "--step",
+                       step_.empty() ? "'" + hold_ + "'" : "'" + step_ + "'",
+                       step_.empty() ? "a time of at most a million steps of 1/24 s, or a longer --step"
+                                     : "a time that gives at most a million steps");
     MaterialProgram program = ramp_and_hold(target, ramp, hold, step);
     program.traction_free = free;
     // Constant volume as the first guess of what is free.

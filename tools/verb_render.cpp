@@ -7,9 +7,11 @@
 
 #include "fitting/cameras.h"
 #include "fitting/case.h"
+#include "fitting/case_camera.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
+#include "tools/clip_argument.h"
 #include "tools/footage_record.h"
 #include "tools/render/footage.h"
 #include "tools/render/skin_camera.h"
@@ -50,18 +52,23 @@ class Render : public Verb {
     app.add_flag("--keep-motion", keep_motion_,
                  "film the truth_motion.bin that is in the folder, if it is of the same scene, instead of "
                  "simulating again");
+    add_clip_option(app, clip_);
   }
 
   ExitCode run(VerbContext& context) override {
-    const fitting::Case c = fitting::load_case(context.options.file, context.options.settings);
+    const ChosenView chosen = chosen_view(fitting::load_case(context.options.file, context.options.settings),
+                                          clip_, context.output_folder());
+    const fitting::Case& c = chosen.of_view;
+    const std::string& folder = chosen.folder;
     const Scene fit = load_scene(c.scene, c.scene_settings);
     const SceneModel truth(truth_scene(c));
     const int stride = frame_stride(fit, truth.scene());
-    const std::string folder = context.output_folder();
     const auto in_folder = [&folder](const char* name) { return (fs::path(folder) / name).string(); };
 
     require_encoder(c, fit, folder);
-    TwinRun twin = motion(context, truth, stride, in_folder("truth_motion.bin"));
+    const TwinRun twin = keep_motion_
+                             ? kept_twin(truth, stride, in_folder("truth_motion.bin"), context.progress)
+                             : run_twin(truth, stride, context.progress);
     if (context.progress.interrupted()) return ExitCode::interrupted;
     // From here on what the folder holds of an earlier truth is wrong. Footage and camera of before stay
     // until the new footage is whole: an interrupted run leaves a pair that belongs together, or no camera.
@@ -70,7 +77,7 @@ class Render : public Verb {
     write_motion(twin.surface, in_folder("truth_motion.bin"));
     const fitting::Camera camera =
         c.camera.empty() ? automatic_camera(twin.surface, c.render.width, c.render.height, c.render.tilt)
-                         : fitting::read_camera(c.camera);
+                         : fitting::read_case_camera(c);
     if (!film(context, c, truth.scene(), twin.surface, camera, folder)) return ExitCode::interrupted;
     nlohmann::json record = truth_record(fit, truth, stride, twin.surface.frames());
     record["footage"].update(footage_record(footage_in(c, folder)));
@@ -85,22 +92,10 @@ class Render : public Verb {
   static void require_encoder(const fitting::Case& c, const Scene& fit, const std::string& folder) {
     int width = c.render.width, height = c.render.height;
     if (!c.camera.empty()) {
-      const fitting::Camera camera = fitting::read_camera(c.camera);
+      const fitting::Camera camera = fitting::read_case_camera(c);
       width = camera.width, height = camera.height;
     }
     const FootageWriter opened(footage_in(c, folder), c.render.codec, fit.time.frame_rate, width, height);
-  }
-
-  TwinRun motion(VerbContext& context, const SceneModel& truth, int stride, const std::string& path) const {
-    if (keep_motion_ && fs::exists(path)) {
-      TwinRun kept;
-      kept.surface = read_motion(path);
-      kept.complete = true;
-      const int frames = truth.scene().time.frames / stride + 1;
-      if (kept.surface.scene == motion_identity(truth) && kept.surface.frames() == frames) return kept;
-      context.progress.note("truth_motion.bin is of another scene or incomplete; simulating again");
-    }
-    return run_twin(truth, stride, context.progress);
   }
 
   /// False when interrupted.
@@ -145,6 +140,7 @@ class Render : public Verb {
   }
 
   bool keep_motion_ = false;
+  std::string clip_;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "fitting/case.h"
 #include "sim/core/error.h"
+#include "tools/clip_argument.h"
 #include "tools/track_footage.h"
 #include "tools/verb.h"
 
@@ -58,6 +59,7 @@ class TrackVerb : public Verb {
     app.add_flag("--there-and-back", there_and_back_,
                  "also follow the points back from the last frame to the first and say how far from their "
                  "start they end: drift, in px; takes as long again");
+    add_clip_option(app, clip_);
   }
 
   ExitCode run(VerbContext& context) override {
@@ -68,13 +70,15 @@ class TrackVerb : public Verb {
         !(std::all_of(roi_.begin(), roi_.end(), is_in_range) && roi_[2] >= 1 && roi_[3] >= 1))
       throw InputError("--roi", roi_text(),
                        "X,Y,W,H in px, from 0 to 100000, with a width and a height of at least 1");
-    const std::string folder = context.output_folder();
+    std::string folder = context.output_folder();
     TrackJob job;
     if (context.options.file.empty()) {
       job = track_job(video_, asked({}));
     } else {
-      const fitting::Case c = fitting::load_case(context.options.file, context.options.settings);
-      job = track_job(c, folder, video_, context.progress, asked(c.track));
+      const ChosenView chosen =
+          chosen_view(fitting::load_case(context.options.file, context.options.settings), clip_, folder);
+      folder = chosen.folder;
+      job = track_job(chosen.of_view, folder, video_, context.progress, asked(chosen.of_view.track));
     }
     job.there_and_back = there_and_back_;
     if (frames_ > 0) job.footage.last = frames_ - 1;
@@ -106,7 +110,7 @@ class TrackVerb : public Verb {
     return text.str();
   }
 
-  std::string video_, model_;
+  std::string video_, model_, clip_;
   std::vector<double> roi_;
   int max_tracks_ = 0, frames_ = 0, window_ = 0;
   double min_distance_ = 0;

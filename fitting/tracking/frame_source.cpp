@@ -62,8 +62,29 @@ std::vector<std::string> expand_glob(const std::string& path) {
   return names;
 }
 
-/// A pattern with exactly one %d or %0Nd: expands the numbers from 0 (or 1) until a file is missing.
-std::vector<std::string> expand_printf(const std::string& path) {
+/// The smallest number above `number` of which `name` is a file's; nothing when there is none. Looks at the files that are
+/// there, since numbers may be far apart.
+template <class Name>
+std::optional<int> next_number(const std::string& path, int number, const Name& name) {
+  const fs::path folder = fs::path(path).parent_path();
+  const std::string begin = fs::path(path.substr(0, path.find('%'))).filename().string();
+  std::optional<int> next;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, ignored)) {
+    const std::string file = entry.path().filename().string();
+    if (!file.starts_with(begin)) continue;
+    std::size_t at = file.find_first_not_of(' ', begin.size()), end = at;
+    while (end < file.size() && file[end] >= '0' && file[end] <= '9') ++end;
+    if (at == std::string::npos || end == at || end - at > 9) continue;
+    const int found = std::stoi(file.substr(at, end - at));
+    if (found > number && (!next || found < *next) && fs::path(name(found)).filename() == file) next = found;
+  }
+  return next;
+}
+
+/// A pattern with exactly one %d or %0Nd: expands the numbers from 0 (or 1) until a file is missing. Throws InputError
+/// when others come after that one, but for frames after `last` (−1: none).
+std::vector<std::string> expand_printf(const std::string& path, int last) {
   const std::size_t percent = path.find('%');
   std::size_t end = percent + 1;
   while (end < path.size() && path[end] >= '0' && path[end] <= '9') ++end;
@@ -82,6 +103,10 @@ std::vector<std::string> expand_printf(const std::string& path) {
     names.push_back(name(number));
   if (names.empty())
     throw InputError(path, "no file " + name(0) + " or " + name(1), "a sequence numbered from 0 or 1");
+  const bool is_enough = last >= 0 && static_cast<std::size_t>(last) < names.size();
+  const int missing = static_cast<int>(names.size()) + (names.front() == name(0) ? 0 : 1);
+  if (const auto later = next_number(path, missing, name); later && !is_enough)
+    throw InputError(path, "no file " + name(missing) + " before " + name(*later), "a sequence without gaps");
   return names;
 }
 
@@ -155,7 +180,7 @@ FrameSource::FrameSource(FrameSourceOptions options)
   } else if (fs::is_regular_file(o.path)) {
     if (is_image(o.path)) r.images = {o.path};
   } else if (o.path.find('%') != std::string::npos) {
-    r.images = expand_printf(o.path);
+    r.images = expand_printf(o.path, o.last);
   } else if (o.path.find_first_of("*?") != std::string::npos) {
     r.images = expand_glob(o.path);
   } else {

@@ -19,7 +19,7 @@ struct Frame {
 };
 
 struct FrameSourceOptions {
-  /// A video file; or stills: a printf pattern ("f_%04d.png", numbered from 0 or 1 upwards), a glob ("*.tif",
+  /// A video file; or stills: a printf pattern ("f_%04d.png", numbered from 0 or 1 upwards without gaps), a glob ("*.tif",
   /// in natural order: 9 before 10), or a single image.
   std::string path;
   std::vector<std::string> images;  ///< instead of path: the stills, in order

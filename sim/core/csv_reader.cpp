@@ -17,6 +17,7 @@ void for_csv_lines(std::istream& in, const std::string& name,
   std::string line;
   for (long count = 1; std::getline(in, line); ++count) {
     CsvLine found;
+    if (count == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // as spreadsheets begin UTF-8
     found.text = trimmed(line);
     if (found.text.empty() || found.text[0] == '#') continue;
     found.place = name + ":" + std::to_string(count);

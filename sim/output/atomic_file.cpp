@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -183,6 +184,7 @@ void write_file(const std::string& path, std::string_view bytes) {
 std::string read_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw InputError(path + ": cannot open: " + std::strerror(errno));
+  if (std::filesystem::is_directory(path)) throw InputError(path, "a folder", "a file");
   std::string bytes{std::istreambuf_iterator<char>(in), {}};
   if (in.bad()) throw InputError(path + ": cannot read: " + std::strerror(errno));
   return bytes;

@@ -42,7 +42,13 @@ double angle_between(const PathKnot& a, const PathKnot& b) {
   return 2 * std::acos(std::min(1.0, cosine));
 }
 
-ColliderMotion::ColliderMotion(const ColliderScene& c) {
+bool has_motion(const Scene& scene) {
+  const auto moves = [](const auto& body) { return body.path.size() > 1; };
+  return std::any_of(scene.colliders.begin(), scene.colliders.end(), moves) ||
+         std::any_of(scene.skin.held.begin(), scene.skin.held.end(), moves);
+}
+
+ColliderMotion::ColliderMotion(const ColliderScene& c, double ahead) : ahead_(ahead) {
   std::vector<double> times, angles;
   bool turns = false;
   for (const PathKnot& k : c.path) {
@@ -67,11 +73,11 @@ ColliderMotion::ColliderMotion(const ColliderScene& c) {
 
 BodyPose ColliderMotion::at(double time) const {
   BodyPose pose;
-  for (const KnotWeight& w : positions_->weights(time))
+  for (const KnotWeight& w : positions_->weights(time + ahead_))
     pose.centre += w.weight * centres_[static_cast<std::size_t>(w.knot)];
   if (!orientations_) return pose;
   Eigen::Vector4d q = Eigen::Vector4d::Zero();
-  for (const KnotWeight& w : orientations_->weights(time))
+  for (const KnotWeight& w : orientations_->weights(time + ahead_))
     q += w.weight * quaternions_[static_cast<std::size_t>(w.knot)];
   pose.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
   return pose;

@@ -20,6 +20,9 @@ std::shared_ptr<const ImplicitShape> collider_shape(const ColliderScene& collide
 /// The radius that can be fitted, mm; 0 for shapes without one (plane, ellipsoid).
 double collider_radius(const ColliderScene& collider);
 
+/// Whether anything moves: a collider or a held part whose path has several knots.
+bool has_motion(const Scene& scene);
+
 /// Angle between the orientations of two knots, rad, in [0, π].
 double angle_between(const PathKnot& a, const PathKnot& b);
 
@@ -32,8 +35,8 @@ struct BodyPose {
 
 class ColliderMotion {
  public:
-  /// The path must not be empty.
-  explicit ColliderMotion(const ColliderScene& collider);
+  /// The path must not be empty. Its clock runs `ahead` s (TimeScene::offset) ahead of the frames.
+  ColliderMotion(const ColliderScene& collider, double ahead);
 
   const std::shared_ptr<const KnotPath>& positions() const { return positions_; }
   /// Null when the body never turns.
@@ -41,9 +44,11 @@ class ColliderMotion {
   /// Unit quaternions (w, x, y, z) of the knots, neighbours in the same half space; empty when it never
   /// turns.
   const std::vector<Eigen::Vector4d>& quaternions() const { return quaternions_; }
+  /// At a time of the frames, s.
   BodyPose at(double time) const;
 
  private:
+  double ahead_;
   std::vector<Vec3> centres_;
   std::vector<Eigen::Vector4d> quaternions_;
   std::shared_ptr<const KnotPath> positions_, orientations_;

@@ -197,6 +197,7 @@ void fields(Archive& archive, T& time) {
   archive("lag_passes", time.lag_passes);
   archive("max_bisections", time.max_bisections);
   archive("damper", time.damper);
+  archive("offset", time.offset);
 }
 
 template <class Archive, FieldsOf<SolverScene> T>

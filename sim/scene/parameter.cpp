@@ -23,6 +23,7 @@ struct Kind {
   double lower, upper;
   ParameterTransform transform;
   double* (*member)(Scene&, size_t i);
+  double reach = 0;  ///< unless 0 the bounds are the value in the scene ± reach
 };
 
 using enum ParameterTransform;
@@ -77,6 +78,8 @@ const Kind kinds[] = {
        auto& friction = s.colliders[i].friction;
        return friction && friction->coefficient > 0 ? &friction->coefficient : nullptr;
      }},
+    {"/time/offset", 0, 0, none, [](Scene& s, size_t) { return has_motion(s) ? &s.time.offset : nullptr; },
+     0.25},
 };
 
 /// A kind of parameter that is one component of a vector: the pattern names the vector's rule, addresses have
@@ -179,7 +182,8 @@ std::vector<Found> find_all(Scene& scene) {
       double* value = kind.member(scene, i);
       if (value == nullptr) continue;
       const std::string address = filled(kind.pattern, names[i]);
-      all.push_back({kind.pattern, kind.lower, kind.upper, kind.transform, value, address,
+      all.push_back({kind.pattern, kind.reach > 0 ? *value - kind.reach : kind.lower,
+                     kind.reach > 0 ? *value + kind.reach : kind.upper, kind.transform, value, address,
                      filled(kind.pattern, std::to_string(i)), short_name(address, !names[i].empty())});
     }
   }
@@ -245,6 +249,8 @@ std::string expected_parameter(const Scene& scene, std::string_view address) {
           (address == filled(kind.pattern, names[i]) || address == filled(kind.pattern, std::to_string(i))))
         is_absent = true;
   }
+  if (is_absent && address == "/time/offset")
+    return "a scene in which a collider or a held part moves, with two knots or more in its path";
   std::vector<std::string> addresses;
   for (const Found& found : find_all(scene)) addresses.push_back(found.address);
   const std::string nearest = nearest_word(address, addresses);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 #include "sim/core/csv_reader.h"
@@ -48,6 +49,7 @@ Vec3 rotation_vector(const Eigen::Quaterniond& q) {
 std::vector<PathKnot> read_path(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file, "a file that cannot be read", "a readable path (CSV)");
+  if (std::filesystem::is_directory(file)) throw InputError(file, "a folder", "a path (CSV)");
   std::vector<PathKnot> knots;
   std::vector<std::size_t> meaning;
   for_csv_lines(in, file, [&](const CsvLine& line) {

@@ -240,6 +240,21 @@ std::vector<Rule> run_rules() {
        .fallback = to_string(time.damper),
        .options = enum_words<DamperScheme>(),
        .doc = "Time integration of the damper; fitted relaxation times depend on it."},
+      {.pointer = "/time/offset",
+       .type = number,
+       .dimension = dimension::time,
+       .fallback = time.offset,
+       .min = -1e6,
+       .max = 1e6,
+       .doc =
+           "By how much the clock of paths (colliders, held parts) runs ahead of the frames: at frame time t "
+           "they are where their paths are at t + offset (before the first knot: at it, after the last: at "
+           "that). "
+           "Frame 0 stays at rest, unless the skin settles first (pre-stretch, parts held away): then it "
+           "settles "
+           "against bodies where they are at the offset. Can be fitted when camera and path have clocks of "
+           "their "
+           "own."},
       {.pointer = "/solver",
        .type = object,
        .fallback = json::object(),

@@ -332,7 +332,8 @@ std::vector<Rule> skin_rules() {
        .type = number,
        .fallback = layer.stiffening,
        .min = 0,
-       .doc = "C of the exponential (Fung) term; the model is meant for C >= 0.25. 0 is the Hencky law."},
+       .doc = "C of the exponential (Fung) term; the model is meant for C >= 0.25. 0 is Hencky's law of the "
+              "deviator (the volume term is K/2 (J - 1)^2 always)."},
       {.pointer = "/skin/layers/*/relaxing_fraction",
        .type = number,
        .fallback = layer.relaxing_fraction,

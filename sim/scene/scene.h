@@ -131,6 +131,7 @@ struct TimeScene {
   int lag_passes = 1;      ///< solves per step over the lag of friction
   int max_bisections = 4;
   DamperScheme damper = DamperScheme::exponential;
+  double offset = 0;  ///< s by which the clock of all paths runs ahead of the frames
 };
 
 struct SolverScene {

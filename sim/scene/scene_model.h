@@ -37,6 +37,9 @@ class SceneModel {
   /// ∂native/∂p at `scene`, p at `address` in internal units. Throws InputError for an address that is not
   /// fit-able.
   VectorXd native_derivative(const Scene& scene, const std::string& address) const;
+  /// Whether the results of a run of this scene are differentiable by a parameter (canonical address). They are
+  /// not in /time/offset where a path has a kink and a step ends.
+  bool is_smooth_in(const std::string& address, const Trajectory& run) const;
 
   /// Ligament parameter b per column for a scene, 1/mm; empty without ligaments.
   VectorXd ligament_map(const Scene& scene) const;

@@ -1,6 +1,7 @@
 #include "sim/scene/vertex_values.h"
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -76,6 +77,8 @@ std::vector<double> read_vertex_values(const std::string& path, const std::strin
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream text;
   if (stream) text << stream.rdbuf();
+  if (std::filesystem::is_directory(path))
+    throw InputError(mentioned_at, path + ", which is a folder", "a file");
   if (!stream || stream.bad()) throw InputError(mentioned_at, path, "a file that can be read");
   const bool is_json = path.size() > 5 && path.compare(path.size() - 5, 5, ".json") == 0;
   std::vector<double> values = is_json ? from_json(text.str(), path) : from_csv(text.str(), path);

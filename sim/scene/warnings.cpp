@@ -138,9 +138,16 @@ void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
                       std::vector<std::string>& warnings) {
   const std::string at = "/colliders/" + collider.name;
   const double end = time.frames / time.frame_rate, step = 1 / (time.frame_rate * time.substeps);
-  if (time.frames > 0 && collider.path.front().time > end)
+  const double read = end + time.offset;
+  const std::string clock = time.offset == 0 ? "" : ", where the path is read at " + time_text(read);
+  if (time.frames > 0 && collider.path.front().time > read)
     warnings.push_back(sentence(at, "/path: starts at ", time_text(collider.path.front().time),
-                                ", after the last frame at ", time_text(end), ", so that it never moves"));
+                                ", after the last frame at ", time_text(end), clock,
+                                ", so that it never moves"));
+  if (time.frames > 0 && collider.path.size() > 1 && collider.path.back().time <= time.offset)
+    warnings.push_back(sentence(at, "/path: ends at ", time_text(collider.path.back().time),
+                                ", before frame 0, where it is read at ", time_text(time.offset),
+                                ", so that it never moves"));
   if (collider.shape == ShapeKind::plane) return;
   const bool is_ellipsoid = collider.shape == ShapeKind::ellipsoid;
   const double size = is_ellipsoid ? collider.semi_axes.minCoeff() : collider.radius;
@@ -149,7 +156,7 @@ void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
   double fastest = 0;
   for (size_t k = 1; k < collider.path.size(); ++k) {
     const PathKnot &a = collider.path[k - 1], &b = collider.path[k];
-    if (a.time >= end || b.time <= 0) continue;
+    if (a.time >= end + time.offset || b.time <= time.offset) continue;
     const double distance = (b.position - a.position).norm();
     fastest = std::max(fastest, distance * std::min(1., step / (b.time - a.time)));
   }
@@ -165,6 +172,24 @@ void warn_of_collider(const ColliderScene& collider, const TimeScene& time,
   }
 }
 
+void warn_of_offset(const Scene& scene, std::vector<std::string>& warnings) {
+  const TimeScene& time = scene.time;
+  if (time.offset == 0 || time.frames == 0) return;
+  const double begin = time.offset, end = begin + time.frames / time.frame_rate;
+  bool moves = false;
+  const auto look_at = [&](const auto& bodies) {
+    for (const auto& body : bodies)
+      moves =
+          moves || (body.path.size() > 1 && body.path.front().time < end && body.path.back().time > begin);
+  };
+  look_at(scene.colliders);
+  look_at(scene.skin.held);
+  if (!moves)
+    warnings.push_back(sentence("/time/offset: with ", time_text(time.offset), " the run covers ",
+                                time_text(begin), " to ", time_text(end),
+                                " of the paths' clock, where nothing moves"));
+}
+
 }  // namespace
 
 std::vector<std::string> scene_warnings(const Scene& scene) {
@@ -175,6 +200,7 @@ std::vector<std::string> scene_warnings(const Scene& scene) {
   warn_of_unused_keys(scene, warnings);
   warn_of_quadrature(scene.skin, warnings);
   for (const ColliderScene& collider : scene.colliders) warn_of_collider(collider, scene.time, warnings);
+  warn_of_offset(scene, warnings);
   if (scene.time.frames == 0)
     warnings.push_back("/time/frames: 0, so that a run ends where it starts; give the number of frames");
   return warnings;

@@ -22,9 +22,6 @@ constexpr int kMaxLineSearchFailures = 4;  // in a row, each with a more cautiou
 constexpr int kRawPatience = 5, kPatience = 20;
 constexpr int kMaxNegativeCurvatureExits = 10;
 constexpr double kLbfgsRefreshStep = 1e-6;  // the publication, "Non-Linear Solver"
-// A direction from a factor in single precision: Newton's to this relative residual, in at most so many solves.
-constexpr double kDirectionTolerance = 1e-7;
-constexpr int kMaxCorrections = 12;
 constexpr unsigned kNegativeCurvatureSeed = 20240229;
 
 class Minimisation {

@@ -29,6 +29,9 @@ enum class FactorPrecision {
 };
 /// Below it assembly costs more than the factor does, and what a float factor saves is not worth its risk.
 inline constexpr double kMixedFromFlops = 2e9;
+/// A direction from a factor in single precision: Newton's to this relative residual, in at most so many solves.
+inline constexpr double kDirectionTolerance = 1e-7;
+inline constexpr int kMaxCorrections = 12;
 
 struct MinimiserOptions {
   Minimiser method = Minimiser::newton;

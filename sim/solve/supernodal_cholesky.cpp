@@ -23,12 +23,8 @@ void strsm_(const char* side, const char* uplo, const char* trans, const char* d
             const int* n, const float* alpha, const float* a, const int* lda, float* b, const int* ldb);
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void spotrf_(const char* uplo, const int* n, float* a, const int* lda, int* info);
-void dtrsv_(const char* uplo, const char* trans, const char* diag, const int* n, const double* a,
-            const int* lda, double* x, const int* incx);
 void strsv_(const char* uplo, const char* trans, const char* diag, const int* n, const float* a,
             const int* lda, float* x, const int* incx);
-void dgemv_(const char* trans, const int* m, const int* n, const double* alpha, const double* a,
-            const int* lda, const double* x, const int* incx, const double* beta, double* y, const int* incy);
 void sgemv_(const char* trans, const int* m, const int* n, const float* alpha, const float* a, const int* lda,
             const float* x, const int* incx, const float* beta, float* y, const int* incy);
 }
@@ -46,8 +42,6 @@ struct Blas<double> {
   static constexpr auto syrk = dsyrk_;
   static constexpr auto trsm = dtrsm_;
   static constexpr auto potrf = dpotrf_;
-  static constexpr auto trsv = dtrsv_;
-  static constexpr auto gemv = dgemv_;
 };
 template <>
 struct Blas<float> {
@@ -55,8 +49,6 @@ struct Blas<float> {
   static constexpr auto syrk = ssyrk_;
   static constexpr auto trsm = strsm_;
   static constexpr auto potrf = spotrf_;
-  static constexpr auto trsv = strsv_;
-  static constexpr auto gemv = sgemv_;
 };
 
 constexpr int kPanelWidth = 128;
@@ -319,39 +311,35 @@ bool SupernodalCholesky::factorize(const int* column_start, const int* rows, con
   return !progress.failed();
 }
 
-template <class Real>
-void SupernodalCholesky::solve(Real* x) const {
-  std::vector<Real> below(static_cast<std::size_t>(largest_height_));
+void SupernodalCholesky::solve(float* x) const {
+  std::vector<float> below(static_cast<std::size_t>(largest_height_));
   const int step = 1;
-  const Real one = 1, zero = 0;
+  const float one = 1, zero = 0;
   // A supernode's rows below its own columns, gathered from x or scattered into it.
   for (int s = 0; s < num_super_; ++s) {
     const int n = height(s), columns = width(s), left = n - columns;
-    const Real* const l = block<Real>(s);
-    Blas<Real>::trsv("L", "N", "N", &columns, l, &n, x + super_[s], &step);
+    const float* const l = block<float>(s);
+    strsv_("L", "N", "N", &columns, l, &n, x + super_[s], &step);
     if (left == 0) continue;
-    Blas<Real>::gemv("N", &left, &columns, &one, l + columns, &n, x + super_[s], &step, &zero, below.data(),
-                     &step);
+    sgemv_("N", &left, &columns, &one, l + columns, &n, x + super_[s], &step, &zero, below.data(), &step);
     const int* const row = rows(s) + columns;
     for (int i = 0; i < left; ++i) x[row[i]] -= below[static_cast<std::size_t>(i)];
   }
-  const Real minus_one = -1;
+  const float minus_one = -1;
   for (int s = num_super_ - 1; s >= 0; --s) {
     const int n = height(s), columns = width(s), left = n - columns;
-    const Real* const l = block<Real>(s);
+    const float* const l = block<float>(s);
     if (left > 0) {
       const int* const row = rows(s) + columns;
       for (int i = 0; i < left; ++i) below[static_cast<std::size_t>(i)] = x[row[i]];
-      Blas<Real>::gemv("T", &left, &columns, &minus_one, l + columns, &n, below.data(), &step, &one,
-                       x + super_[s], &step);
+      sgemv_("T", &left, &columns, &minus_one, l + columns, &n, below.data(), &step, &one, x + super_[s],
+             &step);
     }
-    Blas<Real>::trsv("L", "T", "N", &columns, l, &n, x + super_[s], &step);
+    strsv_("L", "T", "N", &columns, l, &n, x + super_[s], &step);
   }
 }
 
 template bool SupernodalCholesky::factorize<double>(const int*, const int*, const double*, double, int);
 template bool SupernodalCholesky::factorize<float>(const int*, const int*, const double*, double, int);
-template void SupernodalCholesky::solve<double>(double*) const;
-template void SupernodalCholesky::solve<float>(float*) const;
 
 }  // namespace rhytid

@@ -34,9 +34,8 @@ class SupernodalCholesky {
   [[nodiscard]] bool factorize(const int* column_start, const int* rows, const double* values, double shift,
                                int threads);
 
-  /// x [size of the matrix], in the factor's order: L Lᵀ x = b, b overwritten; L as factorize<Real> left it.
-  template <class Real>
-  void solve(Real* x) const;
+  /// x [size of the matrix], in the factor's order: L Lᵀ x = b, b overwritten; L as factorize<float> left it.
+  void solve(float* x) const;
 
   /// Calls visit(pivot) with every diagonal entry of L.
   template <class Real, class Visit>

@@ -76,4 +76,44 @@ std::vector<KnotWeight> KnotPath::weights(double t) const {
   return result;
 }
 
+std::vector<KnotWeight> KnotPath::rates(double t, Side side) const {
+  std::vector<KnotWeight> result;
+  // A piece has the number of the knot it begins at; -1 is the rest before the first.
+  const auto piece = [this](double time) {
+    return static_cast<int>(std::upper_bound(times_.begin(), times_.end(), time) - times_.begin()) - 1;
+  };
+  const int before = piece(t - same_time), after = piece(t + same_time);
+  if (side == Side::mean && before == after) {
+    add_rates(after, t, 1, result);
+  } else {
+    const double share = side == Side::mean ? 0.5 : 1;
+    if (side != Side::after) add_rates(before, t, share, result);
+    if (side != Side::before) add_rates(after, t, share, result);
+  }
+  return result;
+}
+
+void KnotPath::add_rates(int lo, double t, double factor, std::vector<KnotWeight>& result) const {
+  const int n = static_cast<int>(times_.size()), hi = lo + 1;
+  if (lo < 0 || hi >= n) return;
+  const double h = times_[hi] - times_[lo], b = (t - times_[lo]) / h, a = 1 - b;
+  if (curvature_.size() == 0) {
+    const double angle = angles_.empty() ? 0 : angles_[lo];
+    double down = -1 / h, up = 1 / h;
+    if (angle >= 1e-4) {
+      down *= angle * std::cos(a * angle) / std::sin(angle);
+      up *= angle * std::cos(b * angle) / std::sin(angle);
+    }
+    result.push_back({lo, factor * down});
+    result.push_back({hi, factor * up});
+    return;
+  }
+  for (int k = 0; k < n; ++k) {
+    double w = ((1 - 3 * a * a) * curvature_(lo, k) + (3 * b * b - 1) * curvature_(hi, k)) * h / 6;
+    if (k == lo) w -= 1 / h;
+    if (k == hi) w += 1 / h;
+    if (std::fabs(w) > 1e-18) result.push_back({k, factor * w});
+  }
+}
+
 }  // namespace rhytid

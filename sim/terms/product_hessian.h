@@ -62,7 +62,7 @@ class ProductHessian {
 
  private:
   static constexpr int kTile = 2 * kLanes, kPad = 8, kSlots = kHessianRows / 3, kRows = kHessianRows;
-  static_assert(kPad >= kTile || kLanes < 4);
+  static_assert(kPad >= kTile);
 
   /// Columns of the rows (·, c, a), m = a · line nodes + c: those of m and after, padded.
   int columns(int m) const { return ((m_ - m) * p_.plane_nodes + kTile - 1) / kTile * kTile; }
@@ -71,7 +71,8 @@ class ProductHessian {
     if (plane_point_ >= 0) contract();
     if (filled_ == kSlots) flush();
     plane_point_ = t;
-    std::memset(a_, 0, sizeof a_);
+    // Points without energy are left out.
+    std::memset(a_, 0, sizeof a_[0] * static_cast<std::size_t>(p_.line_points));
   }
 
   /// B of the current plane point into its slot, [m][3 slot + r][s][m'].

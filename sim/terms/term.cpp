@@ -13,6 +13,15 @@ constexpr int round_up8(int n) {
   return (n + 7) / 8 * 8;
 }
 
+bool is_on_path(const ThetaSlot& slot) {
+  return slot.kind == ThetaSlot::Kind::path_now || slot.kind == ThetaSlot::Kind::path_old;
+}
+
+/// The time at which a slot reads its path.
+double path_time(const ThetaSlot& slot, const StepInfo& step, double ahead) {
+  return (slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old) + ahead;
+}
+
 }  // namespace
 
 void Term::add_group(TermGroup g) {
@@ -46,7 +55,7 @@ std::size_t Term::bytes() const {
   return sum;
 }
 
-std::vector<std::vector<double>> Term::map_theta(const StepInfo& step, const VectorXd& native,
+std::vector<std::vector<double>> Term::map_theta(const StepInfo& step, const VectorXd& native, double ahead,
                                                  double fixed_scale) const {
   const int nt = kernels_->ntheta;
   std::vector<std::vector<double>> result(groups_.size());
@@ -65,8 +74,7 @@ std::vector<std::vector<double>> Term::map_theta(const StepInfo& step, const Vec
           break;
         case ThetaSlot::Kind::path_now:
         case ThetaSlot::Kind::path_old:
-          for (const KnotWeight& w :
-               slot.path->weights(slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old))
+          for (const KnotWeight& w : slot.path->weights(path_time(slot, step, ahead)))
             row[s] += w.weight * native[slot.offset + slot.stride * w.knot];
           break;
         case ThetaSlot::Kind::fixed:
@@ -92,10 +100,37 @@ std::vector<std::vector<double>> Term::map_theta(const StepInfo& step, const Vec
   return result;
 }
 
-void Term::add_theta_transpose(const StepInfo& step, const std::vector<double>& theta_bar,
-                               VectorXd& native_bar) const {
-  const int nt = kernels_->ntheta;
+std::vector<std::vector<double>> Term::path_rates(const StepInfo& step, const VectorXd& native) const {
+  if (clock_ < 0) return {};
+  std::vector<std::vector<double>> result;
   for (const TermGroup& g : groups_) {
+    result.emplace_back(g.theta.size(), 0.0);
+    for (std::size_t s = 0; s < g.theta.size(); ++s) {
+      const ThetaSlot& slot = g.theta[s];
+      if (!is_on_path(slot)) continue;
+      for (const KnotWeight& w : slot.path->rates(path_time(slot, step, ahead(native))))
+        result.back()[s] += w.weight * native[slot.offset + slot.stride * w.knot];
+    }
+  }
+  return result;
+}
+
+std::vector<std::vector<double>> Term::load_theta_direction(const StepInfo& step, const TermStepData& data,
+                                                            const VectorXd& dnative) const {
+  std::vector<std::vector<double>> result = map_theta(step, dnative, data.ahead, 0);
+  if (clock_ < 0 || dnative[clock_] == 0) return result;
+  const std::size_t nt = static_cast<std::size_t>(kernels_->ntheta);
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi)
+    for (std::size_t k = 0; k < result[gi].size(); ++k)
+      result[gi][k] += data.rates[gi][k % nt] * dnative[clock_];
+  return result;
+}
+
+void Term::add_theta_transpose(const StepInfo& step, const TermStepData& data,
+                               const std::vector<double>& theta_bar, VectorXd& native_bar) const {
+  const int nt = kernels_->ntheta;
+  for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
+    const TermGroup& g = groups_[gi];
     const std::size_t points = static_cast<std::size_t>(g.num_elements) * g.num_points;
     const double* bar = theta_bar.data() + static_cast<std::size_t>(g.first_point) * nt;
     for (int s = 0; s < nt; ++s) {
@@ -113,9 +148,9 @@ void Term::add_theta_transpose(const StepInfo& step, const std::vector<double>& 
       if (slot.kind == ThetaSlot::Kind::constant) {
         native_bar[slot.offset] += sum;
       } else {
-        for (const KnotWeight& w :
-             slot.path->weights(slot.kind == ThetaSlot::Kind::path_now ? step.t : step.t_old))
+        for (const KnotWeight& w : slot.path->weights(path_time(slot, step, data.ahead)))
           native_bar[slot.offset + slot.stride * w.knot] += w.weight * sum;
+        if (clock_ >= 0) native_bar[clock_] += data.rates[gi][static_cast<std::size_t>(s)] * sum;
       }
     }
   }

@@ -6,7 +6,8 @@
 //
 // Parameters reach the points by a linear map of the model's native parameter vector: a constant slot, a
 // field over the columns (ligament b), or a position on a collider's path. The map and its transpose are the
-// only way in and out.
+// only way in and out. It is linear but for the time at which paths are read: their clock may run ahead of the
+// step's by another native parameter, and the map then has the rates of the paths as its derivative.
 #pragma once
 
 #include <memory>
@@ -73,6 +74,8 @@ struct TermGroup {
 struct TermStepData {
   std::vector<double> prepared;            ///< [num_points][np]
   std::vector<std::vector<double>> theta;  ///< per group: one row, or [num_elements·num_points][ntheta]
+  double ahead = 0;                        ///< s by which the clock of paths runs ahead
+  std::vector<std::vector<double>> rates;  ///< per group [ntheta]: derivative of theta by `ahead`, 1/s
 };
 
 /// Calls of a term's functions: work actually done.
@@ -95,6 +98,8 @@ class Term {
   std::vector<TermGroup>& groups() { return groups_; }
   /// Adds a group (fills padding and transposes from node_by_row given unpadded [num_points·R][num_nodes]).
   void add_group(TermGroup group);
+  /// The native parameter, s, by which the clock of this term's paths runs ahead of the step's; −1 = none.
+  void set_clock(int native_index) { clock_ = native_index; }
   int num_points() const { return num_points_; }
   /// Doubles of State::history that belong to this term.
   std::size_t history_size() const { return static_cast<std::size_t>(num_points_) * kernels_->ns; }
@@ -108,15 +113,14 @@ class Term {
 
   /// Parameters at the points from a native vector.
   std::vector<std::vector<double>> load_theta(const StepInfo& step, const VectorXd& native) const {
-    return map_theta(step, native, 1);
+    return map_theta(step, native, ahead(native), 1);
   }
-  /// Their derivative along a direction in the native vector; the map is linear but for fixed slots.
-  std::vector<std::vector<double>> load_theta_direction(const StepInfo& step, const VectorXd& dnative) const {
-    return map_theta(step, dnative, 0);
-  }
-  /// Transpose of load_theta: adds theta_bar [num_points][ntheta] to native_bar.
-  void add_theta_transpose(const StepInfo& step, const std::vector<double>& theta_bar,
-                           VectorXd& native_bar) const;
+  /// Their derivative along a direction in the native vector, at a prepared step.
+  std::vector<std::vector<double>> load_theta_direction(const StepInfo& step, const TermStepData& data,
+                                                        const VectorXd& dnative) const;
+  /// Transpose of load_theta_direction: adds theta_bar [num_points][ntheta] to native_bar.
+  void add_theta_transpose(const StepInfo& step, const TermStepData& data,
+                           const std::vector<double>& theta_bar, VectorXd& native_bar) const;
 
   /// Prepares a step. u is [num_nodes·3]; history is this term's slice.
   void prepare(const StepInfo& step, const VectorXd& native, const VectorXd& u_old, const double* s_old,
@@ -175,14 +179,17 @@ class Term {
   const TermCounters& counters() const { return counters_; }
 
  private:
-  std::vector<std::vector<double>> map_theta(const StepInfo& step, const VectorXd& native,
+  double ahead(const VectorXd& native) const { return clock_ >= 0 ? native[clock_] : 0; }
+  std::vector<std::vector<double>> map_theta(const StepInfo& step, const VectorXd& native, double ahead,
                                              double fixed_scale) const;
+  /// TermStepData::rates; empty without a clock.
+  std::vector<std::vector<double>> path_rates(const StepInfo& step, const VectorXd& native) const;
 
   std::string name_;
   const KernelTable* kernels_;
   std::shared_ptr<const void> law_;
   std::vector<TermGroup> groups_;
-  int num_points_ = 0;
+  int num_points_ = 0, clock_ = -1;
   mutable TermCounters counters_;
 };
 

@@ -14,6 +14,8 @@ void Term::prepare(const StepInfo& step, const VectorXd& native, const VectorXd&
                    TermStepData& data) const {
   ++counters_.prepare;
   data.theta = load_theta(step, native);
+  data.ahead = ahead(native);
+  data.rates = path_rates(step, native);
   if (kernels_->np == 0) return;
   data.prepared.resize(static_cast<std::size_t>(num_points_) * kernels_->np);
   for_elements(*this, step, data, [&](const TermElement& e) {

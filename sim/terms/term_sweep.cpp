@@ -12,7 +12,8 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
   if (!df && (ns == 0 || !ds_new)) return;
   ++counters_.tangent;
   std::vector<std::vector<std::vector<double>>> dtheta;  // per direction, per group
-  for (const VectorXd* direction : dir.dnative) dtheta.push_back(load_theta_direction(step, *direction));
+  for (const VectorXd* direction : dir.dnative)
+    dtheta.push_back(load_theta_direction(step, data, *direction));
   // Parameter directions at the points of an element, [nq][nt][D]; empty without any.
   const auto element_dtheta = [&](std::size_t gi, const TermElement& e) {
     std::vector<double> dth;
@@ -81,7 +82,7 @@ void Term::adjoint_step(const StepInfo& step, const TermStepData& data, const Ve
     });
     if (kernels_->np > 0) bars.add_to(u_old_bar.data());
   }
-  add_theta_transpose(step, theta_bar, native_bar);
+  add_theta_transpose(step, data, theta_bar, native_bar);
 }
 
 double Term::stored(const StepInfo& step, const TermStepData& data, const VectorXd& u, const double* s,
@@ -106,7 +107,7 @@ double Term::stored(const StepInfo& step, const TermStepData& data, const Vector
   }
   if (u_bar) {
     for (std::size_t k = 0; k < ds.size(); ++k) s_bar[k] += ds[k];
-    add_theta_transpose(step, dtheta, *native_bar);
+    add_theta_transpose(step, data, dtheta, *native_bar);
   }
   return total;
 }

@@ -1,5 +1,6 @@
 #include "sim/time/model.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -46,6 +47,47 @@ VectorXd Model::given_displacement(double t) const {
     for (const int node : part.nodes) u.segment<3>(3 * node) = displacement;
   }
   return u;
+}
+
+VectorXd Model::given_velocity(double t) const {
+  if (constraints.moved.empty()) return {};
+  VectorXd v = VectorXd::Zero(3 * num_nodes());
+  for (const MovedNodes& part : constraints.moved) {
+    Vec3 velocity = Vec3::Zero();
+    for (const KnotWeight& w : part.path.rates(t)) velocity += w.weight * part.displacements[w.knot];
+    for (const int node : part.nodes) v.segment<3>(3 * node) = velocity;
+  }
+  return v;
+}
+
+bool Model::clock_meets_kink(const VectorXd& values, const std::vector<double>& times, double room) const {
+  // `value` of a knot: one component of its place.
+  const auto has_kink_at_steps = [&](const KnotPath& path, auto value) {
+    for (const double knot : path.times()) {
+      const auto meets = [&](double t) { return std::fabs(t + ahead(values) - knot) <= room; };
+      if (std::none_of(times.begin(), times.end(), meets)) continue;
+      double jump = 0, speed = 0;
+      for (const bool after : {false, true})
+        for (const KnotWeight& w : path.rates(knot, after ? KnotPath::Side::after : KnotPath::Side::before)) {
+          jump += (after ? 1 : -1) * w.weight * value(w.knot);
+          speed += std::fabs(w.weight * value(w.knot));
+        }
+      if (std::fabs(jump) > 1e-9 * speed) return true;
+    }
+    return false;
+  };
+  for (const Term& term : terms)
+    for (const TermGroup& group : term.groups())
+      for (const ThetaSlot& slot : group.theta)
+        if (slot.path &&
+            has_kink_at_steps(*slot.path, [&](int k) { return values[slot.offset + slot.stride * k]; }))
+          return true;
+  for (const MovedNodes& part : constraints.moved)
+    for (int axis = 0; axis < 3; ++axis)
+      if (has_kink_at_steps(part.path,
+                            [&](int k) { return part.displacements[static_cast<std::size_t>(k)][axis]; }))
+        return true;
+  return false;
 }
 
 std::vector<int> Model::penalties() const {
@@ -104,7 +146,7 @@ StepProblem::StepProblem(const Model& model, const VectorXd& native, const StepI
       step_(step),
       old_(&old),
       data_(model.terms.size()),
-      given_(model.given_displacement(step.t)) {
+      given_(model.given_displacement(step.t + model.ahead(native))) {
   require(step.dt() > 0, "StepProblem: the step's dt must be positive");
   for (std::size_t k = 0; k < model.terms.size(); ++k)
     model.terms[k].prepare(step_, native, old.u, old.history.data() + model.history_offset(k), data_[k]);
@@ -114,6 +156,13 @@ VectorXd StepProblem::displacement(const VectorXd& q) const {
   VectorXd u = model_->to_displacement(q);
   if (given_.size() > 0) u += given_;
   return u;
+}
+
+VectorXd StepProblem::given_by_clock() const {
+  if (model_->clock < 0) return {};
+  VectorXd velocity = model_->given_velocity(step_.t + model_->ahead(*native_));
+  if (velocity.size() > 0 && velocity.isZero(0)) return {};
+  return velocity;
 }
 
 double StepProblem::energy(const VectorXd& q, VectorXd* gradient) {
@@ -193,6 +242,24 @@ void StepProblem::hessian_at(const VectorXd& u, Curvature curvature, BlockMatrix
   for (std::size_t k = 0; k < data_.size(); ++k)
     model_->terms[k].hessian(step_, data_[k], u, curvature == Curvature::projected, sink);
   for (int i : model_->constraints.fixed_unknowns) out.fix(i);
+}
+
+VectorXd StepProblem::hessian_times(const VectorXd& u, const VectorXd& v) const {
+  struct Product : Term::MatrixSink {
+    const VectorXd& v;
+    VectorXd result;
+    explicit Product(const VectorXd& vector) : v(vector), result(VectorXd::Zero(vector.size())) {}
+    void add(const TermGroup& group, int element, double* dense) override {
+      const int n = group.num_nodes, *nodes = group.nodes.data() + static_cast<std::size_t>(element) * n;
+      VectorXd local(3 * n);
+      for (int i = 0; i < n; ++i) local.segment<3>(3 * i) = v.segment<3>(3 * nodes[i]);
+      if (local.isZero(0)) return;
+      const VectorXd product = Eigen::Map<const MatrixXd>(dense, 3 * n, 3 * n) * local;  // symmetric
+      for (int i = 0; i < n; ++i) result.segment<3>(3 * nodes[i]) += product.segment<3>(3 * i);
+    }
+  } sink(v);
+  for (std::size_t k = 0; k < data_.size(); ++k) model_->terms[k].hessian(step_, data_[k], u, false, sink);
+  return sink.result;
 }
 
 VectorXd StepProblem::first_guess(MinimiserReport& work) {

@@ -51,6 +51,9 @@ class Model {
   VectorXd native;                                           ///< current native parameter values
   std::vector<NativeBlock> native_blocks;
   Constraints constraints;
+  /// Native parameter by which the clock of everything that moves (paths of colliders and held parts) runs
+  /// ahead of the steps' time, s; −1 = nothing moves.
+  int clock = -1;
 
   /// Assigns history slices and builds the sparsity. Call once, after terms and constraints are set.
   void finish();
@@ -61,9 +64,16 @@ class Model {
   std::size_t history_offset(std::size_t term) const { return history_offsets_[term]; }
   /// The rest state: zero displacement, C^v = I, no lagged pressure.
   State rest_state() const;
-  /// Displacement of the moved nodes at time t and zero elsewhere [num_nodes·3], mm; empty when no node is
-  /// moved.
+  /// Displacement of the moved nodes at time t of their paths and zero elsewhere [num_nodes·3], mm; empty when
+  /// no node is moved.
   VectorXd given_displacement(double t) const;
+  /// Its rate, mm/s (KnotPath::rates).
+  VectorXd given_velocity(double t) const;
+  /// How far the clock runs ahead with these native values, s.
+  double ahead(const VectorXd& values) const { return clock >= 0 ? values[clock] : 0; }
+  /// Whether a path has a kink (its velocity jumps at a knot) within `room` s of a time that the clock shows
+  /// at one of `times`: results are then not differentiable by how far it runs ahead.
+  bool clock_meets_kink(const VectorXd& values, const std::vector<double>& times, double room) const;
   /// Native parameters that are contact penalties κ.
   std::vector<int> penalties() const;
   const NativeBlock& native_block(const std::string& name) const;  ///< throws ContractError when absent
@@ -95,10 +105,16 @@ class StepProblem final : public Objective {
 
   /// Displacement of all nodes at the step's end for unknowns q, moved nodes included.
   VectorXd displacement(const VectorXd& q) const;
+  /// Derivative of the moved nodes' displacement by the clock [num_nodes·3], mm/s; empty when nothing is moved
+  /// at that time.
+  VectorXd given_by_clock() const;
   /// Energy, gradient by unknowns (when asked and finite) and Hessian where the skin has displacement u,
   /// which need not agree with where the step moves its nodes.
   double energy_at(const VectorXd& u, VectorXd* gradient);
   void hessian_at(const VectorXd& u, Curvature curvature, BlockMatrix& out);
+
+  /// K v with the raw Hessian K at u [num_nodes·3], rows and columns of fixed nodes included, N.
+  VectorXd hessian_times(const VectorXd& u, const VectorXd& v) const;
 
   const Model& model() const { return *model_; }
   const VectorXd& native() const { return *native_; }

@@ -103,8 +103,10 @@ TEST(Certificate, CompositeSlidingAllParameters) {
   expect_all_features(c, report);
   expect_sharp(report);
   EXPECT_EQ(report.without_effect, heights_of_sources(c.scene_model.scene()));
+  // The finger turns at frame 3.
+  EXPECT_EQ(report.not_smooth, std::vector<std::string>{"/time/offset"});
   EXPECT_EQ(report.parameters.size(),
-            all_parameters(c.scene_model.scene()).size() - report.without_effect.size());
+            all_parameters(c.scene_model.scene()).size() - report.without_effect.size() - 1);
 }
 
 /// A small case for what needs no fine mesh, run once.
@@ -146,6 +148,36 @@ TEST(Certificate, NoticesAWrongAdjoint) {
     EXPECT_EQ(check(report, "gauge identity").verdict, has_stiffness ? Verdict::fail : Verdict::pass)
         << block;
   }
+}
+
+TEST(Certificate, WhatIsNoNumberDoesNotPass) {
+  const CertifiedCase& c = small_case();
+  CertificateOptions options;
+  options.adjoint = [](const Model& model, const auto&... rest) {
+    AdjointResult result = adjoint_sweep(model, rest...);
+    result.native_bar[model.native_block("collider/finger").offset] = std::nan("");
+    return result;
+  };
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  EXPECT_EQ(check(report, "duality").verdict, Verdict::fail);
+  EXPECT_FALSE(report.passed());
+}
+
+// A tighter run does not help an error bar that is wrong, though it helps one that only lacks second order.
+TEST(Certificate, NoticesAWrongErrorBar) {
+  const CertifiedCase& c = small_case();
+  CertificateOptions options;
+  int calls = 0;
+  options.adjoint = [&calls](const Model& model, const auto&... rest) {
+    ++calls;
+    AdjointResult result = adjoint_sweep(model, rest...);
+    result.residual_error *= 3;
+    return result;
+  };
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  EXPECT_EQ(check(report, "error bar").verdict, Verdict::fail);
+  EXPECT_GT(check(report, "error bar").figure, 1.5);
+  EXPECT_GE(calls, 4);  // of the gradient, of its repetition and of two loose runs at the least
 }
 
 // Both sweeps wrong in the same way: duality cannot see it, the Taylor test must.

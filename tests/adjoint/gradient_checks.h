@@ -34,7 +34,8 @@ inline double duality(const CertifiedCase& c, const Output& output, const std::v
 
 inline std::vector<std::string> addresses_of(const CertifiedCase& c) {
   std::vector<std::string> all;
-  for (const ParameterSpec& s : all_parameters(c.scene_model.scene())) all.push_back(s.address);
+  for (const ParameterSpec& s : all_parameters(c.scene_model.scene()))
+    if (c.scene_model.is_smooth_in(s.address, c.run)) all.push_back(s.address);
   return all;
 }
 

@@ -9,6 +9,7 @@
 
 #include "fitting/case_rules.h"
 #include "sim/core/error.h"
+#include "sim/scene/load.h"
 #include "tests/support/small_scenes.h"
 
 namespace rhytid::fitting {
@@ -69,6 +70,9 @@ TEST_F(CaseTest, ValuesOfTheSceneAreRefusedWithTheWayToSetThem) {
   EXPECT_THAT(error_of(R"({"scene": "scene.json"})", {"/settings/0=/skin/order=x"}),
               HasSubstr("case.json (--set): /settings/0: /skin/order: got \"x\""));
   EXPECT_THAT(error_of(R"({"extends": "scene.json"})"), HasSubstr("got a scene, expected a case"));
+  EXPECT_THAT(
+      error_of(R"({"scene": "scene.json", "measure": {}, "variants": []})"),
+      HasSubstr("case.json: got an experiment, expected a case (rhytid study sweep runs experiments"));
   write("scene.json", R"({"skin": {"surface": {}, "layers": []}})");
   EXPECT_THAT(error_of(R"({"scene": "scene.json"})"),
               HasSubstr("e.g. --set /settings/0=/skin/surface/file=PATH"));
@@ -167,6 +171,75 @@ TEST_F(CaseTest, FilesAreLookedForBesideTheCaseThenInTheFolder) {
   EXPECT_EQ(camera_path(c, "out"), "out/camera.yaml");
   write("f.mp4", "");
   EXPECT_EQ(footage_path(c, "out"), (folder_ / "f.mp4").string());
+}
+
+TEST_F(CaseTest, ClipsHaveWhatTheyLeaveOutFromTheCase) {
+  const std::string path = write("case.json", R"({
+    "scene": "scene.json", "settings": ["/time/frames=2"], "camera": "a.yaml",
+    "truth": {"settings": ["/skin/order=3"]},
+    "clips": [
+      {"name": "left", "tracks": "left.csv"},
+      {"name": "up", "settings": ["/time/offset=0.01"],
+       "cameras": [{"name": "near", "camera": "b.yaml", "tracks": "up1.csv"}, {"name": "far"}]}],
+    "fit": {"parameters": [{"address": "/skin/layers/film/youngs_modulus"},
+                           {"address": "/clips/*/colliders/0/friction/coefficient", "initial": 0.5},
+                           {"address": "/clips/up/time/offset", "prior_sigma": 0.01}]}})");
+  const Case c = load_case(path);
+  ASSERT_EQ(c.clips.size(), 2u);
+  EXPECT_EQ(c.name, "case");
+  ASSERT_EQ(c.fit.parameters.size(), 4u);
+  const auto named = [&](int k) { return c.fit.parameters[k].clip + ":" + c.fit.parameters[k].address; };
+  EXPECT_EQ(named(0), ":/skin/layers/film/youngs_modulus");
+  EXPECT_EQ(named(1), "left:/colliders/finger/friction/coefficient");
+  EXPECT_EQ(named(2), "up:/colliders/finger/friction/coefficient");
+  EXPECT_EQ(named(3), "up:/time/offset");
+  EXPECT_EQ(c.fit.parameters[2].initial, 0.5);
+  const std::vector<Scene> scenes = scenes_of(c);
+  EXPECT_EQ(scenes[0].time.offset, 0);
+  EXPECT_EQ(scenes[1].time.offset, 0.01);
+  EXPECT_EQ(scenes[1].time.frames, 2);
+
+  const Case left = case_of_view(c, 0, 0), far = case_of_view(c, 1, 1);
+  EXPECT_TRUE(left.clips.empty());
+  EXPECT_EQ(left.camera, (folder_ / "a.yaml").string());
+  EXPECT_EQ(tracks_path(left, folder_of_view(c, 0, 0, "out")), "out/left/left.csv");
+  EXPECT_THAT(texts(left.truth_settings), testing::ElementsAre("/time/frames=2", "/skin/order=3"));
+  EXPECT_EQ(far.camera, left.camera);
+  EXPECT_THAT(texts(far.truth_settings),
+              testing::ElementsAre("/time/frames=2", "/skin/order=3", "/time/offset=0.01"));
+  EXPECT_EQ(folder_of_view(c, 1, 1, "out"), "out/up/far");
+  EXPECT_EQ(view_named(c, "up/far"), (std::pair{1, 1}));
+  EXPECT_THROW(view_named(c, "up"), InputError);
+  // Clips go by their names in settings too.
+  EXPECT_EQ(load_case(path, {"/clips/up/settings/0=/time/offset=0.02"}).clips[1].scene_settings.back().text,
+            "/time/offset=0.02");
+}
+
+TEST_F(CaseTest, WrongClipsAreRefused) {
+  const auto clips = [this](const std::string& list, const std::string& more = "") {
+    return error_of("{\"scene\": \"scene.json\", \"clips\": [" + list + "]" + more + "}");
+  };
+  const auto address = [&](const std::string& text) {
+    return clips(R"({"name": "left"}, {"name": "up"})",
+                 R"(, "fit": {"parameters": [{"address": ")" + text + "\"}]}");
+  };
+  EXPECT_THAT(clips(R"({"tracks": "a.csv"})"), AllOf(HasSubstr("/clips/0/name"), HasSubstr("required")));
+  EXPECT_THAT(clips(R"({"name": "a"}, {"name": "a"})"), HasSubstr("a second time"));
+  EXPECT_THAT(clips(R"({"name": "a"})", R"(, "tracks": "all.csv")"),
+              AllOf(HasSubstr("/tracks"), HasSubstr("each of the clips has its own")));
+  EXPECT_THAT(clips(R"({"name": "a", "settings": ["/skin/ordr=2"]})"),
+              AllOf(HasSubstr("clip 'a'"), HasSubstr("/skin/ordr")));
+  EXPECT_THAT(clips(R"({"name": "a", "tracks": "a.csv", "cameras": [{"name": "x"}]})"), HasSubstr("cameras"));
+  EXPECT_THAT(address("/clips/uq/time/offset"), HasSubstr("nearest is \"up\""));
+  EXPECT_THAT(address("/clips/up/time/ofset"),
+              AllOf(HasSubstr("/fit/parameters/0/address"), HasSubstr("nearest is /time/offset")));
+  EXPECT_THAT(address("/clips/*/skin/layers/fat/youngs_modulus"), HasSubstr("/fit/parameters/0/address"));
+  EXPECT_THAT(address(R"(/clips/up/time/offset"}, {"address": "/clips/*/time/offset)"),
+              HasSubstr("a second time"));
+  EXPECT_THAT(address(R"(/time/offset"}, {"address": "/clips/up/time/offset)"), HasSubstr("a second time"));
+  EXPECT_THAT(error_of(R"({"scene": "scene.json",
+                           "fit": {"parameters": [{"address": "/clips/up/time/offset"}]}})"),
+              HasSubstr("the case has no clips"));
 }
 
 }  // namespace

@@ -167,6 +167,24 @@ TEST(Fit, TruthInAnotherGaugeIsComparedPerUnitOfTheHeldModulus) {
   EXPECT_DOUBLE_EQ(*result.parameters[2].truth, 0.4);
 }
 
+// Camera and path with clocks of their own: their offset is a nuisance parameter like friction.
+TEST(Fit, FindsHowFarThePathsClockRunsAhead) {
+  FitCase fit = test::three_parameters();
+  fit.parameters.push_back(test::fitted("/time/offset"));
+  FitInput input = make_input(fit);
+  input.tracks =
+      test::make_tracks(test::drag_scene(kFrames, {"/time/offset=0.015"}), test::make_camera(), 4, kSigma, 2);
+  input.truth["/time/offset"] = 0.015;
+  const FitResult result = run_fit(input);
+  EXPECT_TRUE(result.converged) << result.status;
+  const FittedParameter& offset = result.parameters.at(3);
+  EXPECT_EQ(offset.unit, "s");
+  EXPECT_NEAR(offset.value, 0.015, 2e-3);
+  EXPECT_LT(offset.low95, 0.015);
+  EXPECT_GT(offset.high95, 0.015);
+  EXPECT_TRUE(offset.determined);
+}
+
 TEST(Fit, FailedForwardRunsAreAStatus) {
   FitInput input = make_input(test::three_parameters());
   input.scene.solver.max_iterations = 1;

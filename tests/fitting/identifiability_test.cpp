@@ -53,7 +53,7 @@ TEST(Identifiability, OneCovarianceOfNoiseAndMisfit) {
     std::normal_distribution<double> normal;
     std::vector<WhitenedTrack> list;
     for (int i = 0; i < kTracks; ++i)
-      list.push_back({Vec2(i % 7, i / 7), {0}, j.row(i), VectorXd::Constant(1, size * normal(rng))});
+      list.push_back({Vec3(i % 7, i / 7, 0), {0}, j.row(i), VectorXd::Constant(1, size * normal(rng))});
     return list;
   };
   const Identifiability noise(j, names, 1.5, 47);
@@ -177,7 +177,7 @@ TEST(Identifiability, IntervalsHoldTheTruthAsOftenAsTheySay) {
       std::iota(numbers.begin(), numbers.end(), 0);
       for (int i = 0; i < kTracks; ++i)
         tracks.push_back(
-            {Vec2(i % 6, i / 6), numbers, j.middleRows(i * rows, rows), z.segment(i * rows, rows)});
+            {Vec3(i % 6, i / 6, 0), numbers, j.middleRows(i * rows, rows), z.segment(i * rows, rows)});
       const Identifiability found(j, log_variables({"a", "b", "c"}), interval_widening(squares, rho), dof,
                                   tracks);
       for (int k = 0; k < kParameters; ++k) inside += std::fabs(t[k]) <= found.half_width(k);

@@ -241,7 +241,8 @@ TEST_F(Resume, NoConvergenceWhereNoStepCanBeRun) {
     EvaluationLog again(folder, identity);
     FitProblem broken = problem();
     broken.log = &again;
-    const OptimiserOutcome outcome = optimise(broken, {.max_evaluations = 300}, {});
+    Search search(broken);
+    const OptimiserOutcome outcome = optimise(search, {.max_evaluations = 300}, {});
     EXPECT_EQ(outcome.status, OptimiserOutcome::Status::failed);
     EXPECT_THAT(outcome.detail, HasSubstr("no step from the best point could be run: "));
     EXPECT_EQ(outcome.t, start);

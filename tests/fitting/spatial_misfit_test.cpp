@@ -56,7 +56,7 @@ class Fields {
 std::vector<WhitenedTrack> one_row_each(const std::vector<Vec2>& at, const MatrixXd& j, const VectorXd& z) {
   std::vector<WhitenedTrack> tracks;
   for (std::size_t i = 0; i < at.size(); ++i)
-    tracks.push_back({at[i],
+    tracks.push_back({Vec3(at[i].x(), at[i].y(), 0),
                       {0},
                       j.row(static_cast<Eigen::Index>(i)),
                       VectorXd::Constant(1, z[static_cast<Eigen::Index>(i)])});
@@ -133,7 +133,7 @@ std::vector<WhitenedTrack> tracks_at(const std::vector<Vec2>& at, int parameters
   }
   for (std::size_t i = 0; i < at.size(); ++i) {
     WhitenedTrack& track = tracks[i];
-    track.pixel = at[i];
+    track.place << at[i], 0;
     for (int row = 0; row < 4; ++row)
       if ((i + row) % 3 != 0) track.rows.push_back(row);
     track.jacobian.resize(track.rows.size(), parameters);
@@ -211,7 +211,7 @@ TEST(SpatialMisfit, DoesNotDependOnTheCoordinatesOrTheUnitOfThePicture) {
   const SpatialMisfit turned(tracks, basis * turn);
   EXPECT_LT((turned.covariance() - turn.transpose() * misfit.covariance() * turn).norm(), 1e-6);
   EXPECT_NEAR(turned.degrees(turn.transpose() * Vec3(1, 2, -1)), misfit.degrees(Vec3(1, 2, -1)), 1e-4);
-  for (WhitenedTrack& track : tracks) track.pixel *= 640;
+  for (WhitenedTrack& track : tracks) track.place *= 640;
   const SpatialMisfit larger(tracks, basis);
   EXPECT_NEAR(larger.kernel_width(), 640 * misfit.kernel_width(), 1e-9);
   EXPECT_LT((larger.covariance() - misfit.covariance()).norm(), 1e-6);
@@ -222,10 +222,10 @@ TEST(SpatialMisfit, SaysNothingWhereItCannot) {
   MatrixXd basis;
   auto tracks = tracks_at(points(1), 3, fields, basis);
   for (WhitenedTrack& track : tracks) track.residuals = fields.white(track.jacobian.rows());
-  for (WhitenedTrack& track : tracks) track.pixel = Vec2(5, 5);
+  for (WhitenedTrack& track : tracks) track.place = Vec3(5, 5, 0);
   EXPECT_EQ(SpatialMisfit(tracks, basis).covariance().norm(), 0);
   tracks.resize(3);
-  for (int i = 0; i < 3; ++i) tracks[i].pixel = Vec2(i, i * i);
+  for (int i = 0; i < 3; ++i) tracks[i].place = Vec3(i, i * i, 0);
   EXPECT_EQ(SpatialMisfit(tracks, basis).covariance().norm(), 0);
   EXPECT_EQ(SpatialMisfit({}, basis).covariance().norm(), 0);
   EXPECT_EQ(SpatialMisfit(tracks, basis).degrees(Vec3(1, 0, 0)), 1);

@@ -52,4 +52,9 @@ grep -q '>FAIL<' "$folder/b/certificate.html" || { echo "FAILED: certificate.htm
 # The step is not solved within one iteration: no run, no gradient.
 expect 3 "$folder/scene.json" -o "$folder/c" --set /solver/max_iterations=1 --set /time/max_bisections=0
 expect 2 "$folder/scene.json" -o "$folder/d" --parameters /skin/layers/soft/youngs_modulos
+# The finger comes a little earlier: first order of a loose run's error cancels by chance, a tighter one decides.
+sed 's/"time": 0,/"time": -0.01,/; s/"time": 0.1,/"time": 0.09,/; s/"time": 1,/"time": 0.99,/' "$folder/scene.json" \
+  >"$folder/earlier.json"
+expect 0 "$folder/earlier.json" -o "$folder/e" --parameters /skin/layers/soft/youngs_modulus
+grep -q 'at tolerance 1e-04 the functional' "$folder/out" || { echo "FAILED: a second loose run"; failures=$((failures + 1)); }
 exit $((failures > 0))

@@ -3,28 +3,12 @@
 # and a fit that is killed and goes on to the same bits.
 #   fitting_verbs.sh PROGRAM SCRATCH_FOLDER
 set -u
-program=$1 scratch=$2
+program=$1 scratch=$2 tests=$(realpath "$(dirname "$0")")
 failures=0
 fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
 rm -rf "$scratch" && mkdir -p "$scratch" && cd "$scratch" || exit 1
 
-cat >scene.json <<'SCENE'
-{
-  "name": "tiny",
-  "skin": {
-    "surface": {"grid": {"size": ["16 mm", "12 mm"], "cells": [4, 3]}}, "order": 2,
-    "layers": [{"name": "skin", "thickness": "1.5 mm", "order": 1, "youngs_modulus": "50 kPa"}]
-  },
-  "ligaments": {"sources": [{"name": "a", "position": [-2, -1, -1.5], "strength": 1.5, "radius": "4 mm"}]},
-  "base": {"shape": "plane", "stiffness": "0.1 MPa/mm", "onset": "0.02 mm"},
-  "colliders": [
-    {"name": "finger", "shape": "sphere", "radius": "2 mm", "stiffness": "0.1 MPa/mm", "onset": "0.02 mm",
-     "friction": {"coefficient": 0.5, "slip_speed": "2 mm/s"},
-     "path": [{"time": 0, "position": [-4, -3, 2.02]}, {"time": 0.1, "position": [-4, -3, 1.5]},
-              {"time": 0.3, "position": [-2, -3, 1.5]}]}],
-  "time": {"frame_rate": "20 Hz", "frames": 4}
-}
-SCENE
+cp "$tests/tiny_scene.json" scene.json || exit 1
 cat >case.json <<'CASE'
 {
   "scene": "scene.json",

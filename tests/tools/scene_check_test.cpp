@@ -2,10 +2,12 @@
 // and doubtful settings are named.
 #include <gmock/gmock.h>
 
+#include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "sim/core/parallel.h"
 #include "sim/scene/load.h"
 #include "tests/support/paths.h"
 #include "tests/support/real_data.h"
@@ -46,6 +48,16 @@ std::vector<std::string> review(const std::vector<std::string>& changes) {
   return review_scene(scene_model, measure_step_cost(scene_model));
 }
 
+TEST(SceneWarnings, offset_past_all_motion) {
+  const auto warnings = [](const std::string& offset) {
+    return scene_warnings(small_scene({"/time/offset=" + offset}));
+  };
+  EXPECT_THAT(warnings("2 s"), Contains(HasSubstr("/time/offset: with 2 s the run covers 2 s to 2.1")));
+  EXPECT_THAT(warnings("-0.2 s"), Contains(HasSubstr("where nothing moves")));
+  EXPECT_THAT(warnings("-0.1 s"), Not(Contains(HasSubstr("/time/offset"))));
+  EXPECT_THAT(warnings("0.9 s"), Not(Contains(HasSubstr("/time/offset"))));
+}
+
 TEST(BundledScenes, rest_in_equilibrium) {
   const std::vector<std::string> files = bundled_scenes();
   ASSERT_GE(files.size(), 3u);
@@ -53,8 +65,12 @@ TEST(BundledScenes, rest_in_equilibrium) {
     SCOPED_TRACE(file);
     const SceneModel scene_model(load_scene(file));
     const StepCost cost = measure_step_cost(scene_model);
-    // Colliders stand off the skin at time 0, so every force is a product with an exact zero.
-    EXPECT_EQ(cost.rest_residual, 0);
+    // Colliders stand off the skin at time 0, so every force is a product with an exact zero. What is pre-stretched
+    // settles first.
+    if (scene_model.scene().skin.pre_stretch)
+      EXPECT_GT(cost.rest_residual, 0);
+    else
+      EXPECT_EQ(cost.rest_residual, 0);
     EXPECT_TRUE(cost.positive_definite);
     const std::vector<std::string> warnings = review_scene(scene_model, cost);
     EXPECT_THAT(warnings, Not(Contains(HasSubstr("into the skin at time 0"))));
@@ -164,6 +180,62 @@ TEST(Review, names_what_holds_nothing) {
   const SceneModel nothing(loose);
   EXPECT_THAT(review_scene(nothing, measure_step_cost(nothing)),
               Contains(HasSubstr("neither ligaments nor base")));
+}
+
+// Processor time on one thread, which does not know what else the machine does. A factor of two was seen; twice that
+// is left for iterations and for caches that others use.
+TEST(Estimate, tells_what_a_run_takes) {
+  const int threads = num_threads();
+  set_num_threads(1);
+  const SceneModel scene_model(small_scene());
+  const StepCost cost = measure_step_cost(scene_model);
+  const std::clock_t before = std::clock();
+  const Trajectory run = simulate(scene_model.model(), scene_model.native(), scene_model.run_options());
+  const double seconds = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+  set_num_threads(threads);
+  ASSERT_TRUE(run.complete);
+  const double expected = cost.analysis_seconds + static_cast<double>(run.steps.size()) * cost.step_seconds();
+  EXPECT_GT(expected, seconds / 4);
+  EXPECT_LT(expected, seconds * 4);
+}
+
+// Without a term that lags there is one pass, whatever the scene says.
+TEST(Estimate, later_passes_cost_what_they_do) {
+  StepCost cost;
+  cost.residual_seconds = cost.hessian_seconds = cost.factor_seconds = cost.solve_seconds = 1;
+  cost.certificate_seconds = 2;
+  cost.state_seconds = 5;
+  EXPECT_DOUBLE_EQ(cost.step_seconds(1), 5 + expected_iterations * 4.5 + 1 + 2);
+  EXPECT_DOUBLE_EQ(cost.step_seconds(3), 5 + 3 * (expected_iterations * 4.5 + 1 + 2));
+}
+
+const std::string kHeldSide =
+    R"(/skin/held=[{"name":"side","box":{"low":[-8,-6,-9],"high":[-7.9,6,9]},"path":[)"
+    R"({"time":0,"displacement":[0,0,0]},{"time":0.5,"displacement":[16,3,1]}]}])";
+
+TEST(Review, held_parts_that_jump_with_the_clock) {
+  const auto jumps = Contains(HasSubstr("held parts rest in frame 0 and are 8 mm away"));
+  EXPECT_THAT(review({kHeldSide, "/time/offset=0.25"}), jumps);
+  EXPECT_THAT(review({kHeldSide}), Not(jumps));
+  EXPECT_THAT(review({kHeldSide, "/time/offset=-0.25"}), Not(jumps));
+}
+
+// Frame 0 is the rest state also then; its residual is that of the colliders alone.
+TEST(Rest, is_at_rest_whatever_the_clock_of_held_parts) {
+  const SceneModel ahead(small_scene({kHeldSide, "/time/offset=0.25", "/colliders=[]"}));
+  const StepCost cost = measure_step_cost(ahead);
+  EXPECT_EQ(cost.rest_residual, 0);
+  EXPECT_TRUE(cost.positive_definite);
+}
+
+// A part that is far away at once inverts elements: no residual, and no zero for it.
+TEST(Rest, has_no_residual_outside_the_domain) {
+  const SceneModel torn(
+      small_scene({R"(/skin/held=[{"name":"side","box":{"low":[-8,-6,-9],"high":[-7.9,6,9]},"path":[)"
+                   R"({"time":0,"displacement":[30,0,0]},{"time":1,"displacement":[31,0,0]}]}])"}));
+  const StepCost cost = measure_step_cost(torn);
+  EXPECT_TRUE(std::isinf(cost.rest_residual));
+  EXPECT_FALSE(cost.positive_definite);
 }
 
 TEST(Review, doubts_moduli_that_no_skin_has) {

@@ -123,8 +123,8 @@ TEST(Sensitivity, OfASceneThroughTheVerb) {
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_THAT(call.out, HasSubstr("All stiffnesses together"));
   for (const char* file :
-       {"parameters.csv", "frames.csv", "singular_values.csv", "correlation.csv", "map.csv", "map.png",
-        "map.vtp", "map.ply", "rms.svg", "sensitivity.txt", "index.html"})
+       {"parameters.csv", "frames.csv", "figures.csv", "singular_values.csv", "correlation.csv", "map.csv",
+        "map.png", "map.vtp", "map.ply", "rms.svg", "sensitivity.txt", "index.html"})
     EXPECT_TRUE(place.has(std::string("out/") + file)) << file;
   const auto json = nlohmann::json::parse(place.text("out/sensitivity.json"));
   EXPECT_TRUE(json["gauge"]);
@@ -159,6 +159,50 @@ TEST(Sensitivity, OfASceneThroughTheVerb) {
   const double difference = (figure_at(1.02) - figure_at(0.98)) / std::log(1.02 / 0.98);
   EXPECT_NEAR(by_log_b, difference, 0.01 * std::abs(difference));
   EXPECT_LT(by_log_b, 0);  // stiffer ligaments hold the skin
+}
+
+/// What a sensitivity study says of the last frame: figure -> (value, derivatives).
+std::map<std::string, std::pair<double, std::vector<double>>> last_frame(const StudyPlace& place) {
+  std::map<std::string, std::pair<double, std::vector<double>>> found;
+  const auto json = nlohmann::json::parse(place.text("out/sensitivity.json"));
+  for (const auto& figure : json["last_frame"])
+    found[figure["figure"]] = {figure["value"], figure["derivatives"].get<std::vector<double>>()};
+  return found;
+}
+
+// Forces, energy and wrinkles: every derivative against differences of runs.
+TEST(Sensitivity, OfForcesEnergyAndWrinkles) {
+  const std::string film = "/skin/layers/film/youngs_modulus", knot = "/colliders/finger/path/2/position/0";
+  const auto study = [&](double factor, double shift) {
+    const StudyPlace place("sensitivity_figures");
+    write_file(place.at("experiment.json"), R"({"name": "figures", "scene": "scene.json",
+      "measure": {"wavelengths": ["1 mm", "12 mm"], "line": {"from": [-7, 0, 0], "to": [7, 0, 0]},
+                  "window": {"centre": [0, 0, 0], "size": [14, 10]}},
+      "variants": [{"name": "one", "settings": []}]})");
+    const StudyCall call = place.call(
+        "sensitivity", "experiment.json",
+        {"--parameter", film, "--parameter", knot, "--set", film + "=" + std::to_string(1 * factor) + " MPa",
+         "--set", knot + "=" + std::to_string(8 + shift) + " mm"});
+    EXPECT_EQ(call.code, 0) << call.err;
+    EXPECT_THAT(call.out, HasSubstr("window_coherence"));
+    return last_frame(place);
+  };
+  const auto here = study(1, 0);
+  const double h = 0.01;
+  // Places are counted in units of half of what a fit may move them.
+  const double unit = 5;
+  const auto more = study(std::exp(h), 0), less = study(std::exp(-h), 0), ahead = study(1, h * unit),
+             behind = study(1, -h * unit);
+  for (const char* name : {"force_finger", "stored_energy", "line_amplitude", "line_wavelength",
+                           "window_amplitude", "window_wavelength", "window_direction", "window_coherence"}) {
+    ASSERT_TRUE(here.contains(name)) << name;
+    const auto& [value, derivatives] = here.at(name);
+    const double by_film = (more.at(name).first - less.at(name).first) / (2 * h),
+                 by_knot = (ahead.at(name).first - behind.at(name).first) / (2 * h);
+    const double scale = 1e-3 * std::abs(value);
+    EXPECT_NEAR(derivatives[0], by_film, 0.01 * std::abs(by_film) + scale) << name;
+    EXPECT_NEAR(derivatives[1], by_knot, 0.01 * std::abs(by_knot) + scale) << name;
+  }
 }
 
 TEST(Sensitivity, RefusesInOneLine) {

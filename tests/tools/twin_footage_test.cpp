@@ -200,7 +200,7 @@ TEST_F(TwinFootage, TruthTracksAreExactProjections) {
     EXPECT_NEAR(first->pixel.x(), std::round(first->pixel.x()), 1e-9);
     for (const fitting::Observation& o : track.observations) {
       const Vec3 x = surface.position(*point, o.frame);
-      const Vec3 tip = ColliderMotion(scene.colliders[0]).at(o.time_s).centre;
+      const Vec3 tip = ColliderMotion(scene.colliders[0], 0).at(o.time_s).centre;
       const Vec3 sight = (x - camera.centre()).normalized();
       const double clearance = sight.cross(tip - camera.centre()).norm() - 2;
       if (o.status == fitting::TrackStatus::ok) {

@@ -1,5 +1,5 @@
 // What `rhytid bench` runs: one benchmark per subcommand. A new one is a class in tools/bench and a line in
-// benchmarks.cpp; options of its own, files and exit codes work as in a verb.
+// benchmarks.cpp, or in verb_fitting_bench.cpp when it needs fits; options of its own, files and exit codes work as in a verb.
 #pragma once
 
 #include <memory>
@@ -26,7 +26,10 @@ class Benchmark {
   virtual ExitCode run(VerbContext& context, const std::string& folder) = 0;
 };
 
-/// All benchmarks, in the order of the help.
+/// Those of the simulator, in the order of the help.
 std::vector<std::unique_ptr<Benchmark>> make_benchmarks();
+
+/// `bench` with these. rhytid-forward has those of the simulator, rhytid those of fits too.
+std::unique_ptr<Verb> make_bench_verb(std::vector<std::unique_ptr<Benchmark>> benchmarks);
 
 }  // namespace rhytid::tools

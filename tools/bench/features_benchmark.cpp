@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 
 #include "adjoint/sweeps.h"
 #include "sim/output/atomic_file.h"
@@ -12,6 +11,7 @@
 #include "tools/bench/bench_scenes.h"
 #include "tools/bench/program_starts.h"
 #include "tools/bench/scene_variants.h"
+#include "tools/bench/timing.h"
 #include "tools/frame_writer.h"
 #include "tools/peak_memory.h"
 
@@ -25,11 +25,6 @@ struct VariantCost {
   long iterations = 0, evaluations = 0;
   double peak = 0, states = 0;             ///< MB
   std::vector<double> seconds, processor;  ///< per step: of the clock; of all threads, without waiting
-
-  static double median(std::vector<double> t) {
-    std::nth_element(t.begin(), t.begin() + static_cast<long>(t.size() / 2), t.end());
-    return t[t.size() / 2];
-  }
 };
 
 /// Features that cost nothing at all here, by their numbers (feature_work.h).
@@ -125,9 +120,9 @@ class FeaturesBenchmark : public Benchmark {
     observer.step = [&](const StepEvent& event) {
       if (writer && event.frame_done) writer->write(event.record.frame, event.state);
     };
-    const std::clock_t before = std::clock();
+    const double before = cpu_seconds();
     const Trajectory run = simulate(scene_model.model(), scene_model.native(), options, observer);
-    const double processor = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+    const double processor = cpu_seconds() - before;
     if (context.progress.interrupted()) return;
     if (!run.complete)
       throw adjoint::GradientError(variant.name + ": the run did not reach its last frame: " + run.failure);
@@ -152,15 +147,15 @@ class FeaturesBenchmark : public Benchmark {
                  "| variant | s per step | range | processor s per step | of the full one | iterations per "
                  "step | peak of the process, MB | "
                  "states, MB | costs nothing |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
-    const double full = VariantCost::median(costs.front().processor);
+    const double full = median(costs.front().processor);
     for (const VariantCost& c : costs) {
       const auto [fastest, slowest] = std::minmax_element(c.seconds.begin(), c.seconds.end());
-      const double median = VariantCost::median(c.seconds), processor = VariantCost::median(c.processor);
+      const double middle = median(c.seconds), processor = median(c.processor);
       const double iterations = static_cast<double>(c.iterations) / c.steps;
-      csv.add_row({scene, c.name, std::int64_t{c.nodes}, std::int64_t{c.steps}, median, *fastest, *slowest,
+      csv.add_row({scene, c.name, std::int64_t{c.nodes}, std::int64_t{c.steps}, middle, *fastest, *slowest,
                    processor, processor / full, iterations, static_cast<double>(c.evaluations) / c.steps,
                    c.peak, c.states, c.skipped});
-      markdown_ += "| " + c.name + " | " + text(median) + " | " + text(*fastest) + " .. " + text(*slowest) +
+      markdown_ += "| " + c.name + " | " + text(middle) + " | " + text(*fastest) + " .. " + text(*slowest) +
                    " | " + text(processor) + " | " + text(processor / full, "%.2f") + " | " +
                    text(iterations) + " | " + text(c.peak, "%.0f") + " | " +
                    (c.states > 0 ? text(c.states) : "") + " | " + c.skipped + " |\n";

@@ -1,26 +1,20 @@
 #include "tools/bench/gradient_cost.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "adjoint/certificate.h"
 #include "adjoint/parameter_space.h"
+#include "tools/bench/timing.h"
 
 namespace rhytid::tools {
 namespace {
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
-
 template <class F>
 double seconds_of(F&& f) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start = clock_seconds();
   f();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return clock_seconds() - start;
 }
 
 }  // namespace

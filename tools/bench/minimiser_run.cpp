@@ -1,16 +1,12 @@
 #include "tools/bench/minimiser_run.h"
 
 #include <algorithm>
-#include <ctime>
 
 #include "sim/output/text.h"
+#include "tools/bench/timing.h"
 #include "tools/peak_memory.h"
 
 namespace rhytid::tools {
-
-double cpu_seconds() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 MinimiserOptions minimiser_to_compare(Minimiser method, const MinimiserOptions& of_scene) {
   MinimiserOptions options = method == Minimiser::lbfgs_literal ? published_minimiser() : MinimiserOptions();

@@ -9,9 +9,6 @@
 
 namespace rhytid::tools {
 
-/// CPU seconds of all threads of this process so far.
-double cpu_seconds();
-
 /// The scene's tolerances with the settings of a minimiser: those of `MinimiserOptions` for ours, those of
 /// published_minimiser() for lbfgs_literal; iterations are not limited, as time is.
 MinimiserOptions minimiser_to_compare(Minimiser method, const MinimiserOptions& of_scene);

@@ -9,6 +9,7 @@
 #include "sim/output/csv.h"
 #include "tools/bench/bench_scenes.h"
 #include "tools/bench/minimiser_run.h"
+#include "tools/bench/timing.h"
 
 namespace rhytid::tools {
 namespace {
@@ -28,12 +29,6 @@ struct Compared {
     run = std::move(next);
   }
 };
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
 
 std::string formatted(const char* format, double value) {
   char text[32];
@@ -116,7 +111,9 @@ class MinimisersBenchmark : public Benchmark {
         "that, "
         "and a run longer than --limit, is a row that says so. Each starts its steps from its own states by "
         "the same rule. Differences of displacements and energy are to the first minimiser, seconds are CPU "
-        "seconds of all threads (medians). Its own tolerance of the publication is --set "
+        "seconds of all threads (medians). Ours go by factors in single precision where the scene's "
+        "/solver/factor_precision has it so, the publication's never. Its own tolerance of the publication "
+        "is --set "
         "/solver/relative_tolerance=0 --set /solver/absolute_tolerance=1e-6. Writes minimisers.csv and "
         "minimisers.md into -o DIR."};
   }

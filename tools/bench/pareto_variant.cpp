@@ -11,8 +11,9 @@
 #include "adjoint/sweeps.h"
 #include "sim/core/error.h"
 #include "sim/output/csv.h"
-#include "tools/bench/minimiser_run.h"
+#include "tools/bench/timing.h"
 #include "tools/peak_memory.h"
+#include "tools/run_observer.h"
 #include "tools/study/wrinkle_recorder.h"
 
 namespace rhytid::tools {
@@ -54,12 +55,6 @@ class Points {
   std::vector<adjoint::MaterialPoint> on_surface_;
   adjoint::PointInterpolation interpolation_;
 };
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
 
 void add_wrinkles(const SceneModel& scene_model, const WrinkleMeasure& measure, const VectorXd& u,
                   VariantResult& result) {
@@ -138,14 +133,7 @@ std::optional<VariantResult> measure_pareto_variant(const SceneModel& scene_mode
   const SurfaceSamples samples = comparison_points(model.mesh, *experiment.comparison);
   const Points points(model.mesh, samples);
   const RunOptions options = scene_model.run_options();
-  RunObserver observer;
-  observer.iteration = [&](int, double, int iteration, double, double residual) {
-    progress.iteration(iteration, residual);
-    return !progress.interrupted();
-  };
-  observer.step = [&](const StepEvent& event) {
-    if (event.frame_done && event.record.frame > 0) progress.step_done(event.record.frame);
-  };
+  const RunObserver observer = progress_observer(progress);
   Trajectory run;
   std::vector<double> seconds;
   double peak = 0;

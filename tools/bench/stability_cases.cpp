@@ -254,6 +254,21 @@ void add_degenerate(CaseList& list) {
            CaseList::clear_outcome);
   list.add("degenerate", "one iteration allowed", {"/solver/max_iterations=1"}, true,
            CaseList::clear_outcome);
+  list.add("clock of the paths", "-1 s: before all knots", {"/time/offset=-1"}, true);
+  for (const char* offset : {"-1e-3", "1e-9", "0.05", "1"})
+    list.add("clock of the paths", std::string(offset) + " s", {std::string("/time/offset=") + offset});
+  list.add("clock of the paths", "1e6 s: after all knots", {"/time/offset=1e6"});
+  list.add("factor precision", "full", {"/solver/factor_precision=full"});
+  list.add("factor precision", "mixed", {"/solver/factor_precision=mixed"}, true);
+  const std::string mixed = "/solver/factor_precision=mixed";
+  list.add("factor precision", "mixed, Poisson's ratio 0.4999",
+           {mixed, "/skin/layers/soft/poissons_ratio=0.4999", "/skin/layers/film/poissons_ratio=0.4999"});
+  list.add("factor precision", "mixed, moduli 1e4:1", {mixed, "/skin/layers/film/youngs_modulus=200"});
+  list.add("factor precision", "mixed, penalty 1e9 kPa/mm",
+           {mixed, "/base/stiffness=1e6", "/colliders/finger/stiffness=1e6"}, true);
+  list.add("factor precision", "mixed, film 0.001 of the total",
+           {mixed, "/skin/layers/film/thickness=0.00165"});
+  list.add("factor precision", "mixed, ligaments rounded over 1e-8 mm", {mixed, "/ligaments/smoothing=1e-8"});
   list.add("minimiser", "newton_projected", {"/solver/minimiser=newton_projected"});
   list.add("minimiser", "lbfgs", {"/solver/minimiser=lbfgs"});
   list.add("minimiser", "lbfgs_literal", {"/solver/minimiser=lbfgs_literal"});
@@ -271,15 +286,23 @@ void add_corners(CaseList& list) {
                       b = pick("1e-3", "1", "1e4"), kappa = pick("0.1", "10", "1e4"),
                       eps = pick("1e-4", "1e-2", "1"), onset = pick("1e-6", "1e-3", "0.1"),
                       slip = pick("1e-3", "1", "1e2"), thickness = pick("0.00165", "0.15", "0.8");
-    list.add(
-        "corner", std::to_string(k),
-        {"/skin/layers/soft/poissons_ratio=" + nu, "/skin/layers/film/poissons_ratio=" + nu,
-         "/skin/layers/film/youngs_modulus=" + film, "/skin/layers/soft/relaxation_time=" + tau,
-         "/skin/layers/soft/stiffening=" + c, "/skin/layers/film/stiffening=" + c,
-         "/ligaments/sources/left/strength=" + b, "/ligaments/smoothing=" + eps, "/base/stiffness=" + kappa,
-         "/colliders/finger/stiffness=" + kappa, "/base/onset=" + onset, "/colliders/finger/onset=" + onset,
-         "/colliders/finger/friction/slip_speed=" + slip, "/skin/layers/film/thickness=" + thickness},
-        k % 4 == 1 || k == 6 || k == 12);
+    std::vector<std::string> settings = {"/skin/layers/soft/poissons_ratio=" + nu,
+                                         "/skin/layers/film/poissons_ratio=" + nu,
+                                         "/skin/layers/film/youngs_modulus=" + film,
+                                         "/skin/layers/soft/relaxation_time=" + tau,
+                                         "/skin/layers/soft/stiffening=" + c,
+                                         "/skin/layers/film/stiffening=" + c,
+                                         "/ligaments/sources/left/strength=" + b,
+                                         "/ligaments/smoothing=" + eps,
+                                         "/base/stiffness=" + kappa,
+                                         "/colliders/finger/stiffness=" + kappa,
+                                         "/base/onset=" + onset,
+                                         "/colliders/finger/onset=" + onset,
+                                         "/colliders/finger/friction/slip_speed=" + slip,
+                                         "/skin/layers/film/thickness=" + thickness};
+    list.add("corner", std::to_string(k), settings, k % 4 == 1 || k == 6 || k == 12);
+    settings.emplace_back("/solver/factor_precision=mixed");
+    list.add("corner, mixed precision", std::to_string(k), std::move(settings), k == 6);
   }
 }
 

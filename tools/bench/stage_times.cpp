@@ -127,10 +127,11 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
 
   report.steps = static_cast<int>(run.steps.size());
   report.run_seconds = run.seconds;
-  double factorisations = 0;
+  double factorisations = 0, single = 0;
   for (const StepRecord& record : run.steps) {
     report.iterations += record.report.iterations;
     factorisations += record.report.factorisations;
+    single += record.report.single_factorisations;
   }
   const auto per_step = [&](double count) { return count / report.steps; };
   const double prepares = per_step(static_cast<double>(after.prepare - before.prepare)),
@@ -189,7 +190,7 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
   report.factor_entries = static_cast<double>(factor.factor_entries());
   report.factor_flops = factor.factor_flops();
   bool positive = true;
-  add({.name = "factorisation", .calls = per_step(factorisations), .flops = factor.factor_flops()},
+  add({.name = "factorisation", .calls = per_step(factorisations - single), .flops = factor.factor_flops()},
       [&] { positive = factor.factorize(matrix) && positive; });
   if (!positive)
     throw adjoint::GradientError("the Hessian at the end of the last step is not positive definite");
@@ -201,11 +202,21 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
   // Forward and backward: the factor is read twice.
   const double factor_bytes = 2. * 8 * report.factor_entries;
   if (!stopped) {
-    add({.name = "solve, 1 right-hand side", .calls = iterations, .bytes = factor_bytes, .is_serial = true},
+    // A direction from every factor in single precision, and from one in double for each iteration that had none.
+    add({.name = "solve, 1 right-hand side",
+         .calls = std::max(0., iterations - per_step(single)),
+         .bytes = factor_bytes,
+         .is_serial = true},
         [&] { solution = factor.solve(rhs.col(0)); });
     add({.name = "solve, 8 right-hand sides", .bytes = factor_bytes, .is_serial = true},
         [&] { solution = factor.solve(rhs); });
   }
+  add({.name = "factorisation, single", .calls = per_step(single), .flops = factor.factor_flops()},
+      [&] { positive = factor.factorize(matrix, 0, Precision::single) && positive; });
+  // On stiff matrices single precision may fail; a run then corrects no direction by it either.
+  if (!stopped && factor.usable())
+    add({.name = "direction, corrected", .calls = per_step(single), .is_serial = true},
+        [&] { (void)factor.solve_iteratively(matrix, rhs.col(0), kDirectionTolerance, kMaxCorrections); });
   add({.name = "matrix times vector",
        .bytes = 8. * static_cast<double>(matrix.values().size()),
        .is_serial = true},

@@ -26,12 +26,9 @@ Times times_of_rounds(const std::vector<TimedCall>& calls,
   return times;
 }
 
-std::vector<double> medians(Times times) {
+std::vector<double> medians(const Times& times) {
   std::vector<double> result;
-  for (std::vector<double>& t : times) {
-    std::nth_element(t.begin(), t.begin() + static_cast<long>(t.size() / 2), t.end());
-    result.push_back(t[t.size() / 2]);
-  }
+  for (const std::vector<double>& t : times) result.push_back(median(t));
   return result;
 }
 
@@ -54,6 +51,16 @@ double thread_seconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double cpu_seconds() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
 std::vector<double> median_seconds_in_turn(double seconds, const std::vector<TimedCall>& calls,

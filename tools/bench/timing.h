@@ -11,6 +11,11 @@ double clock_seconds();
 /// Processor time of the calling thread, s: stands still while others have the core.
 double thread_seconds();
 
+/// CPU seconds of all threads of this process so far.
+double cpu_seconds();
+/// Of a sorted copy; the mean of the two in the middle when their number is even. `values` has one at least.
+double median(std::vector<double> values);
+
 /// A call to time, and what is done before each time without being timed.
 struct TimedCall {
   std::function<void()> call, before = {};

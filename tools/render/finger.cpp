@@ -57,7 +57,7 @@ std::vector<Finger> fingers_at(const Scene& scene, double time, const Vec3& dire
   std::vector<Finger> fingers;
   for (const ColliderScene& collider : scene.colliders) {
     if (collider.shape != ShapeKind::sphere) continue;
-    const Vec3 tip = ColliderMotion(collider).at(time).centre;
+    const Vec3 tip = ColliderMotion(collider, scene.time.offset).at(time).centre;
     fingers.push_back({tip, tip + 1.2 * collider.radius * direction, collider.radius});
   }
   return fingers;

@@ -64,6 +64,21 @@ double footprint(const MovingSurface& surface, const fitting::Camera& camera, in
 
 }  // namespace
 
+Image sensor_picture(const PictureLevels& levels, int frame, double noise, unsigned seed) {
+  Image image(levels.width, levels.height, 3);
+  parallel_for(levels.height, [&](std::int64_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < levels.width; ++x) {
+      const double shift = noise > 0 ? noise * normal_number(frame, x, y, seed) : 0;
+      const double* pixel = &levels.values[3 * static_cast<size_t>(row * levels.width + x)];
+      for (int c = 0; c < 3; ++c)
+        image.pixel(x, y)[c] =
+            static_cast<std::uint8_t>(std::lround(std::clamp(pixel[c] + shift, 0.0, 255.0)));
+    }
+  });
+  return image;
+}
+
 struct SkinRenderer::Lit {
   MatrixX3 positions, normals;
   std::vector<Finger> fingers;
@@ -214,6 +229,10 @@ Vec3 SkinRenderer::sample(const Lit& lit, size_t index, const Vec2& pixel) const
 }
 
 Image SkinRenderer::render(int frame) const {
+  return sensor_picture(levels(frame), frame, options_.noise, options_.seed);
+}
+
+PictureLevels SkinRenderer::levels(int frame) const {
   require(frame >= 0 && frame < surface_.frames(), "SkinRenderer: frame out of range");
   const VectorXd& u = surface_.displacements[static_cast<size_t>(frame)];
   Lit lit;
@@ -234,7 +253,8 @@ Image SkinRenderer::render(int frame) const {
   lit.buffer = visibility(lit.positions);
 
   const int n = options_.supersampling;
-  Image image(camera_.width, camera_.height, 3);
+  PictureLevels picture{camera_.width, camera_.height, {}};
+  picture.values.resize(3 * static_cast<size_t>(camera_.width) * static_cast<size_t>(camera_.height));
   parallel_for(camera_.height, [&](std::int64_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < camera_.width; ++x) {
@@ -242,15 +262,11 @@ Image SkinRenderer::render(int frame) const {
       for (int sy = y * n; sy < (y + 1) * n; ++sy)
         for (int sx = x * n; sx < (x + 1) * n; ++sx)
           sum += sample(lit, lit.buffer.index(sx, sy), lit.buffer.position(sx, sy));
-      const double noise =
-          options_.noise > 0 ? options_.noise * normal_number(frame, x, y, options_.seed) : 0;
-      for (int c = 0; c < 3; ++c) {
-        const double level = srgb_level(sum[c] / (n * n)) + noise;
-        image.pixel(x, y)[c] = static_cast<std::uint8_t>(std::lround(std::clamp(level, 0.0, 255.0)));
-      }
+      double* pixel = &picture.values[3 * static_cast<size_t>(row * camera_.width + x)];
+      for (int c = 0; c < 3; ++c) pixel[c] = srgb_level(sum[c] / (n * n));
     }
   });
-  return image;
+  return picture;
 }
 
 }  // namespace rhytid::tools

@@ -22,6 +22,16 @@ namespace rhytid::tools {
 /// Subdivision of the faces so that sub-triangles are about `edge_px` long in the picture; 1..48.
 int subdivision_for(const MovingSurface& surface, const fitting::Camera& camera, double edge_px);
 
+/// What reaches the sensor: sRGB grey levels of 255 before noise and rounding, [height · width][3].
+struct PictureLevels {
+  int width = 0, height = 0;
+  std::vector<double> values;
+};
+
+/// The picture that a sensor with noise of this standard deviation, in grey levels, makes of them. The noise
+/// belongs to `seed` and `frame`: SkinRenderer::render(frame) is this of its levels with the case's seed.
+Image sensor_picture(const PictureLevels& levels, int frame, double noise, unsigned seed);
+
 class SkinRenderer {
  public:
   /// All four must outlive the renderer; `tessellation` is the surface's own, `scene` gives the colliders.
@@ -30,6 +40,8 @@ class SkinRenderer {
 
   /// The picture at the end of a frame of the surface, RGB.
   Image render(int frame) const;
+  /// The same before the sensor, so that a frame is drawn once for many draws of noise.
+  PictureLevels levels(int frame) const;
 
  private:
   struct Lit;

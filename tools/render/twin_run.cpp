@@ -1,10 +1,12 @@
 #include "tools/render/twin_run.h"
 
 #include <cmath>
+#include <filesystem>
 
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
 #include "sim/time/model_digest.h"
+#include "tools/run_observer.h"
 
 namespace rhytid::tools {
 
@@ -36,11 +38,7 @@ TwinRun run_twin(const SceneModel& truth, int stride, Progress& progress) {
   RunOptions options = truth.run_options();
   options.keep_states = false;
   progress.stage("simulate", options.frames);
-  RunObserver observer;
-  observer.iteration = [&progress](int, double, int iteration, double, double residual) {
-    progress.iteration(iteration, residual);
-    return !progress.interrupted();
-  };
+  RunObserver observer = progress_observer(progress);
   observer.step = [&](const StepEvent& event) {
     if (!event.frame_done) return;
     progress.step_done(event.record.frame);
@@ -52,6 +50,17 @@ TwinRun run_twin(const SceneModel& truth, int stride, Progress& progress) {
   const Trajectory run = simulate(model, truth.native(), options, observer);
   out.complete = run.complete, out.failure = run.failure, out.seconds = run.seconds;
   return out;
+}
+
+TwinRun kept_twin(const SceneModel& truth, int stride, const std::string& path, Progress& progress) {
+  if (!std::filesystem::exists(path)) return run_twin(truth, stride, progress);
+  TwinRun kept;
+  kept.surface = read_motion(path);
+  kept.complete = true;
+  const int frames = truth.scene().time.frames / stride + 1;
+  if (kept.surface.scene == motion_identity(truth) && kept.surface.frames() == frames) return kept;
+  progress.note("truth_motion.bin is of another scene or incomplete; simulating again");
+  return run_twin(truth, stride, progress);
 }
 
 }  // namespace rhytid::tools

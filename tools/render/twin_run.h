@@ -29,4 +29,7 @@ struct TwinRun {
 /// Simulates. The progress line shows frames and Newton iterations; an interrupt stops the run.
 TwinRun run_twin(const SceneModel& truth, int stride, Progress& progress);
 
+/// The complete motion in the file at `path` when it is of this very scene, else that of run_twin.
+TwinRun kept_twin(const SceneModel& truth, int stride, const std::string& path, Progress& progress);
+
 }  // namespace rhytid::tools

@@ -166,6 +166,33 @@ void add_table(HtmlPage& page, const FitResult& fit) {
   page.table(table);
 }
 
+/// What each clip contributed and how well it is followed: a clip that stands out has an error of its own.
+void add_clips(HtmlPage& page, const FitResult& fit) {
+  if (fit.clips.empty()) return;
+  HtmlTable table;
+  table.caption =
+      "The clips. Reduced chi-square is the squared misfit per independent number of the clip: one that "
+      "stands "
+      "out has a path, a camera or a scene that fits it less.";
+  table.header = {"clip",     "camera",   "frames",
+                  "tracks",   "left out", "observations",
+                  "rms [px]", "cost",     "reduced chi-square"};
+  table.text_columns = 2;
+  for (const fitting::FittedClip& clip : fit.clips) {
+    const bool is_single = clip.views.size() == 1;
+    table.rows.push_back({clip.name.empty() ? "–" : clip.name, is_single ? clip.views[0].camera : "all",
+                          std::to_string(clip.frames), std::to_string(clip.num_tracks),
+                          std::to_string(clip.tracks_left_out), std::to_string(clip.num_observations),
+                          short_text(clip.rms_px, 3), short_text(clip.cost, 4),
+                          short_text(clip.reduced_chi_square, 3)});
+    for (size_t v = 0; v < clip.views.size() && !is_single; ++v)
+      table.rows.push_back({"", clip.views[v].camera, "", std::to_string(clip.views[v].num_tracks), "",
+                            std::to_string(clip.views[v].num_observations),
+                            short_text(clip.views[v].rms_px, 3), "", ""});
+  }
+  page.table(table);
+}
+
 }  // namespace
 
 void add_answer(HtmlPage& page, const ReportData& data) {
@@ -192,6 +219,7 @@ void add_answer(HtmlPage& page, const ReportData& data) {
   }
   add_forest(page, fit);
   add_table(page, fit);
+  add_clips(page, fit);
 }
 
 }  // namespace rhytid::tools

@@ -63,12 +63,12 @@ void draw_marks(cv::Mat& picture, const std::vector<FitResidual>& residuals, dou
 }
 
 /// The frame, or grey paper around the marks when there is no footage.
-cv::Mat background(const ReportData& data, int frame, bool& is_footage) {
+cv::Mat background(const SeenClip& data, int frame, bool& is_footage) {
   const auto found = footage_frame(data.footage, frame);
   is_footage = found.has_value();
   if (found) return *found;
   double width = 64, height = 48;
-  for (const FitResidual& r : data.fit.residuals) {
+  for (const FitResidual& r : data.residuals) {
     width = std::max(width, r.x_px + 20);
     height = std::max(height, r.y_px + 20);
   }
@@ -77,9 +77,9 @@ cv::Mat background(const ReportData& data, int frame, bool& is_footage) {
   return {side(height), side(width), CV_8UC3, cv::Scalar(90, 90, 90)};
 }
 
-void add_overlay(HtmlPage& page, const ReportData& data, int frame) {
+void add_overlay(HtmlPage& page, const SeenClip& data, int frame) {
   std::vector<FitResidual> shown;
-  for (const FitResidual& r : data.fit.residuals) {
+  for (const FitResidual& r : data.residuals) {
     if (r.frame == frame) shown.push_back(r);
   }
   bool is_footage = false;
@@ -98,13 +98,13 @@ void add_overlay(HtmlPage& page, const ReportData& data, int frame) {
           short_text(factor) + " times its length.");
 }
 
-void add_frame_errors(HtmlPage& page, const ReportData& data) {
+void add_frame_errors(HtmlPage& page, const SeenClip& data) {
   struct Sum {
     double squares = 0, weighted = 0, weights = 0;
     int count = 0;
   };
   std::map<int, Sum> frames;
-  for (const FitResidual& r : data.fit.residuals) {
+  for (const FitResidual& r : data.residuals) {
     if (!std::isfinite(length(r))) continue;
     Sum& sum = frames[r.frame];
     sum.squares += length(r) * length(r);
@@ -133,7 +133,7 @@ void add_frame_errors(HtmlPage& page, const ReportData& data) {
   plot.y.minimum = 0;
   if (worst > 0) plot.y.maximum = 1.25 * worst;
   plot.series = {plain};
-  const bool weights_matter = std::any_of(data.fit.residuals.begin(), data.fit.residuals.end(),
+  const bool weights_matter = std::any_of(data.residuals.begin(), data.residuals.end(),
                                           [](const FitResidual& r) { return r.weight < 0.999; });
   if (weights_matter) {
     plot.series[0].label = "all alike";
@@ -147,13 +147,13 @@ void add_frame_errors(HtmlPage& page, const ReportData& data) {
 }
 
 /// The tracks that fit worst: where to look first when a fit disappoints.
-void add_worst_tracks(HtmlPage& page, const ReportData& data) {
+void add_worst_tracks(HtmlPage& page, const SeenClip& data) {
   struct Sum {
     double squares = 0, weight = 0, largest = 0;
     int count = 0;
   };
   std::map<int, Sum> tracks;
-  for (const FitResidual& r : data.fit.residuals) {
+  for (const FitResidual& r : data.residuals) {
     if (!std::isfinite(length(r))) continue;
     Sum& sum = tracks[r.track];
     sum.squares += length(r) * length(r);
@@ -183,16 +183,19 @@ void add_worst_tracks(HtmlPage& page, const ReportData& data) {
 
 void add_footage(HtmlPage& page, const ReportData& data) {
   page.section("footage", "Predicted against tracked features");
-  const int frame = data.late_frame();
-  if (frame < 0) {
-    page.paragraph("The fit left no residuals.");
-    return;
+  for (const SeenClip& seen : data.seen) {
+    if (!seen.title.empty()) page.heading("Clip " + seen.title);
+    const int frame = seen.late_frame();
+    if (frame < 0) {
+      page.paragraph("The fit left no residuals.");
+      continue;
+    }
+    add_overlay(page, seen, frame);
+    page.begin_row();
+    add_frame_errors(page, seen);
+    add_worst_tracks(page, seen);
+    page.end_row();
   }
-  add_overlay(page, data, frame);
-  page.begin_row();
-  add_frame_errors(page, data);
-  add_worst_tracks(page, data);
-  page.end_row();
 }
 
 }  // namespace rhytid::tools

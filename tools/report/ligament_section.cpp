@@ -120,8 +120,9 @@ VectorXd ligament_deviation(const SceneModel& model, const fitting::FitResult& f
   bool moves = false;
   for (Eigen::Index k = 0; k < n; ++k) {
     const fitting::FittedParameter& p = fit.parameters[static_cast<size_t>(k)];
-    const VectorXd column =
-        model.native_derivative(model.scene(), p.address).segment(block.offset, block.size);
+    const std::string address = fit.address_in_clip(p, 0);  // the map is that of the first clip
+    if (address.empty()) continue;
+    const VectorXd column = model.native_derivative(model.scene(), address).segment(block.offset, block.size);
     if (column.isZero(0)) continue;
     moves = true;
     if (p.determined && std::isfinite(p.sigma)) {

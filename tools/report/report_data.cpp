@@ -37,22 +37,56 @@ void load_model(ReportData& data) {
   }
 }
 
-void load_camera(ReportData& data) {
-  if (data.fit.camera_file.empty()) return;
+std::optional<fitting::Camera> load_camera(const std::string& named, ReportData& data) {
+  if (named.empty()) return std::nullopt;
   try {
-    const std::string file = found_file(data.fit.camera_file, data);
-    if (file.empty()) throw InputError(data.fit.camera_file + ": the camera file is not there");
-    data.camera = fitting::read_camera(file);
+    const std::string file = found_file(named, data);
+    if (file.empty()) throw InputError(named + ": the camera file is not there");
+    return fitting::read_camera(file);
   } catch (const InputError& e) {
     data.left_out.push_back(std::string("The skin is not shown as the camera saw it: ") + e.what());
+    return std::nullopt;
   }
+}
+
+SeenClip load_seen(const std::string& title, const std::string& camera, const std::string& footage,
+                   ReportData& data) {
+  SeenClip seen;
+  seen.title = title;
+  seen.camera = load_camera(camera, data);
+  seen.footage = found_file(footage, data);
+  if (seen.footage.empty()) {
+    const std::string lacking = "No footage in the pictures" + (title.empty() ? "" : " of " + title) + ": ";
+    data.left_out.push_back(lacking + (footage.empty() ? "the fit names none." : footage + " is not there."));
+  }
+  return seen;
+}
+
+void load_all_seen(ReportData& data) {
+  if (data.fit.clips.empty()) {
+    data.seen.push_back(load_seen("", data.fit.camera_file, data.fit.footage_file, data));
+    data.seen[0].residuals = data.fit.residuals;
+    return;
+  }
+  std::vector<size_t> first;  // of each clip among `seen`
+  for (const fitting::FittedClip& clip : data.fit.clips) {
+    first.push_back(data.seen.size());
+    for (const fitting::FittedView& view : clip.views) {
+      const std::string title = clip.name.empty()       ? "camera " + view.camera
+                                : clip.views.size() > 1 ? clip.name + ", camera " + view.camera
+                                                        : clip.name;
+      data.seen.push_back(load_seen(title, view.camera_file, view.footage_file, data));
+    }
+  }
+  for (const fitting::FitResidual& r : data.fit.residuals)
+    data.seen[first[static_cast<size_t>(r.clip)] + static_cast<size_t>(r.view)].residuals.push_back(r);
 }
 
 }  // namespace
 
-int ReportData::late_frame() const {
+int SeenClip::late_frame() const {
   std::map<int, int> counts;
-  for (const fitting::FitResidual& r : fit.residuals) ++counts[r.frame];
+  for (const fitting::FitResidual& r : residuals) ++counts[r.frame];
   int fullest = 0, late = -1;
   for (const auto& [frame, count] : counts) fullest = std::max(fullest, count);
   for (const auto& [frame, count] : counts) {
@@ -66,13 +100,9 @@ ReportData gather_report_data(const std::string& folder) {
   data.folder = folder;
   data.fit = fitting::read_fit_result(folder);
   load_model(data);
-  load_camera(data);
-  data.footage = found_file(data.fit.footage_file, data);
-  if (data.footage.empty()) {
-    data.left_out.push_back(data.fit.footage_file.empty()
-                                ? "No footage in the pictures: the fit names none."
-                                : "No footage in the pictures: " + data.fit.footage_file + " is not there.");
-  }
+  load_all_seen(data);
+  data.camera = data.seen[0].camera;
+  data.footage = data.seen[0].footage;
   return data;
 }
 

@@ -15,6 +15,17 @@
 
 namespace rhytid::tools {
 
+/// What one camera saw of one clip, and how well it is predicted.
+struct SeenClip {
+  std::string title;  ///< "left" or "left, camera 2"; empty where there is but one
+  std::vector<fitting::FitResidual> residuals;
+  std::optional<fitting::Camera> camera;
+  std::string footage;  ///< that exists; empty when none does
+
+  /// Frames with residuals: the last one that has at least half as many as the fullest; −1 without residuals.
+  int late_frame() const;
+};
+
 struct ReportData {
   std::string folder;
   fitting::FitResult fit;
@@ -24,8 +35,10 @@ struct ReportData {
   std::string footage;                ///< that exists; empty when none does
   std::vector<std::string> left_out;  ///< sentences: what the report lacks and why
 
-  /// Frames with residuals: the last one that has at least half as many as the fullest; −1 without residuals.
-  int late_frame() const;
+  /// One per clip and camera, in the order of the fit; the first is that of model, camera and footage.
+  std::vector<SeenClip> seen;
+
+  int late_frame() const { return seen.front().late_frame(); }
 };
 
 /// Reads fit.json and residuals.csv of `folder` (throws InputError without them) and what they name. Files

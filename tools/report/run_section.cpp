@@ -22,7 +22,7 @@ Facts count_facts(const ReportData& data) {
 
 Facts file_facts(const ReportData& data) {
   Facts facts;
-  const auto add = [&facts](const char* what, const std::string& path) {
+  const auto add = [&facts](const std::string& what, const std::string& path) {
     if (!path.empty()) facts.emplace_back(what, path);
   };
   add("Case", data.fit.case_file);
@@ -31,6 +31,12 @@ Facts file_facts(const ReportData& data) {
   add("Footage", data.fit.footage_file);
   add("Tracks", data.fit.tracks_file);
   add("Camera", data.fit.camera_file);
+  for (const fitting::FittedClip& clip : data.fit.clips)
+    for (const fitting::FittedView& view : clip.views)
+      add("Tracks of " + (clip.name.empty()       ? "camera " + view.camera
+                          : clip.views.size() > 1 ? clip.name + ", camera " + view.camera
+                                                  : clip.name),
+          view.tracks_file);
   add("Results", data.folder);
   return facts;
 }

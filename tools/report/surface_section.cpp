@@ -18,7 +18,7 @@ std::vector<PictureSolid> glass_fingers(const Scene& scene, double time) {
   std::vector<PictureSolid> solids;
   for (const ColliderScene& collider : scene.colliders) {
     if (collider.shape != ShapeKind::sphere || collider.path.empty()) continue;
-    const Vec3 at = ColliderMotion(collider).at(time).centre;
+    const Vec3 at = ColliderMotion(collider, scene.time.offset).at(time).centre;
     solids.push_back(capsule_solid(at, at, collider.radius));
     solids.back().opacity = 0.25;
   }

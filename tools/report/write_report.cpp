@@ -8,6 +8,7 @@
 #include "sim/time/simulate.h"
 #include "tools/report/sections.h"
 #include "tools/report/wording.h"
+#include "tools/run_observer.h"
 
 namespace rhytid::tools {
 namespace {
@@ -27,11 +28,7 @@ std::optional<LateFrame> simulate_late_frame(ReportData& data, Progress& progres
   if (options.frames == 0) return std::nullopt;
   progress.stage("simulate at the fitted values", options.frames);
   LateFrame reached;
-  RunObserver observer;
-  observer.iteration = [&](int, double, int iteration, double, double residual) {
-    progress.iteration(iteration, residual);
-    return !progress.interrupted();
-  };
+  RunObserver observer = progress_observer(progress);
   observer.step = [&](const StepEvent& event) {
     if (!event.frame_done) return;
     reached.frame = event.record.frame;

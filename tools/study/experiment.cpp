@@ -186,8 +186,29 @@ void check_variant_name(const std::string& name, const std::string& where) {
       throw InputError(where, shown_json(name) + ", which is a file of the " + study, "another name");
 }
 
+namespace {
+
+nlohmann::json any_file(const std::string& path) {
+  return read_with_extends(path, rule_tree(), "scene or experiment").json;
+}
+
+}  // namespace
+
 bool is_experiment(const std::string& path) {
-  return read_with_extends(path, rule_tree(), "scene or experiment").json.contains("variants");
+  return any_file(path).contains("variants");
+}
+
+void refuse_case(const std::string& path) {
+  if (other_file(any_file(path)) == OtherFile::a_case)
+    throw InputError(path, "a case", "an experiment or a scene, such as the one that the case names");
+}
+
+OtherFile other_file(const nlohmann::json& root) {
+  if (root.contains("variants")) return OtherFile::none;
+  if (root.contains("scene"))
+    for (const char* key : {"fit", "track", "tracks", "footage", "camera", "render", "truth"})
+      if (root.contains(key)) return OtherFile::a_case;
+  return root.contains("skin") ? OtherFile::a_scene : OtherFile::none;
 }
 
 std::string variant_names(const Experiment& experiment) {
@@ -198,8 +219,14 @@ std::string variant_names(const Experiment& experiment) {
   return text + (experiment.variants.size() > most ? ", ..." : "");
 }
 
-Experiment load_experiment(const std::string& path, StudySize size) {
+Experiment load_experiment(const std::string& path, StudySize size, const char* if_scene) {
   const LocatedJson written = read_with_extends(path, rule_tree(), "experiment");
+  // Said here, since its keys would only be compared with those of experiments.
+  if (const OtherFile other = other_file(written.json); other != OtherFile::none)
+    throw InputError(path, other == OtherFile::a_case ? "a case" : "a scene",
+                     "an experiment, which names its scene and lists variants (an example: "
+                     "data/scenes/sheared_sheet/experiment.json)" +
+                         std::string(other == OtherFile::a_scene ? if_scene : ""));
   const LocatedJson located = resolve_against_rules(written, rule_tree());
   check(located);
   const json& root = located.json;

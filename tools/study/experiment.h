@@ -64,7 +64,13 @@ void check_variant_name(const std::string& name, const std::string& where);
 /// "soft, firm".
 std::string variant_names(const Experiment& experiment);
 
-/// Reads an experiment at a size. Throws InputError of one line.
-Experiment load_experiment(const std::string& path, StudySize size);
+/// Another kind of file where an experiment is wanted.
+enum class OtherFile { none, a_scene, a_case };
+OtherFile other_file(const nlohmann::json& root);
+/// Throws InputError where the file is a case.
+void refuse_case(const std::string& path);
+
+/// Reads an experiment at a size. Throws InputError of one line, with `if_scene` behind it where the file is a scene.
+Experiment load_experiment(const std::string& path, StudySize size, const char* if_scene = "");
 
 }  // namespace rhytid::tools

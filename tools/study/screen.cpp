@@ -11,6 +11,7 @@
 #include "adjoint/surface_response.h"
 #include "sim/core/digest.h"
 #include "sim/core/error.h"
+#include "tools/run_observer.h"
 #include "tools/step_reading.h"
 #include "tools/study/wrinkle_recorder.h"
 
@@ -188,11 +189,7 @@ class Screen {
     VariantResult result{std::to_string(run + 1), identity_of(run), "complete", "", {}};
     RunOptions options = scene_model_.run_options();
     options.keep_states = false;
-    RunObserver observer;
-    observer.iteration = [&](int, double, int iteration, double, double residual) {
-      context_.progress.iteration(iteration, residual);
-      return !context_.progress.interrupted();
-    };
+    RunObserver observer = progress_observer(context_.progress);
     observer.step = [&](const StepEvent& event) {
       if (event.frame_done && event.record.frame == options.frames) result.columns = measure_(event);
     };

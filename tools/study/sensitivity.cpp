@@ -6,6 +6,7 @@
 #include <ostream>
 
 #include "adjoint/ligament_gradient.h"
+#include "adjoint/output_values.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
 #include "tools/polished_run.h"
@@ -74,6 +75,18 @@ void drop_without_effect(Sensitivity& s, const ParameterSpace& space, const adjo
       s.without_effect.push_back(specs[k].address);
     }
   }
+}
+
+/// Leaves the rows of `first` in the tangents and returns those below them.
+std::vector<MatrixXd> split_off(adjoint::TangentResult& tangent, const adjoint::Output& first) {
+  std::vector<MatrixXd> rest;
+  for (std::size_t f = 0; f < tangent.frames.size(); ++f) {
+    MatrixXd& frame = tangent.frames[f];
+    const Eigen::Index rows = first.size(static_cast<int>(f));
+    rest.push_back(frame.bottomRows(frame.rows() - rows));
+    frame.conservativeResize(rows, Eigen::NoChange);
+  }
+  return rest;
 }
 
 /// A tenth of the coordinates along a direction, with what that is of places and of fractions: "by 10 %", "by
@@ -170,11 +183,13 @@ ExitCode run_sensitivity(VerbContext& context, const SensitivityOptions& options
   const std::vector<ParameterSpec> specs = study_parameters(scene_model.scene(), options.addresses);
   if (specs.empty()) throw InputError(context.options.file, "no parameters", "a scene with at least one");
   SensitivityOptions used = options;
+  used.shown_variant = loaded.variant;
   if (!options.hold.empty()) used.hold = describe_parameter(scene_model.scene(), options.hold).address;
   if (!used.hold.empty() && std::none_of(specs.begin(), specs.end(),
                                          [&](const ParameterSpec& p) { return p.address == used.hold; }))
     throw InputError("--hold", "'" + options.hold + "'", "one of the parameters that are studied");
   require_frames(scene_model.scene(), context.options.file);
+  const ShownFigures shown(model, loaded.measure);
   const std::string folder = context.output_folder();
 
   ExitCode code = ExitCode::ok;
@@ -184,11 +199,17 @@ ExitCode run_sensitivity(VerbContext& context, const SensitivityOptions& options
   try {
     progress.stage("tangent of " + std::to_string(specs.size()) + " parameters", 0);
     const ParameterSpace space(scene_model, addresses_of(specs));
-    adjoint::TangentResult tangent = adjoint::tangent_sweep(
-        model, scene_model.native(), *run, adjoint::OuterDisplacements(model.mesh), space.jacobian());
+    const auto outer = std::make_shared<adjoint::OuterDisplacements>(model.mesh);
+    adjoint::TangentResult tangent =
+        adjoint::tangent_sweep(model, scene_model.native(), *run,
+                               adjoint::CombinedOutput({outer, shown.output()}), space.jacobian());
+    std::vector<MatrixXd> of_shown = split_off(tangent, *outer);
     std::vector<int> kept;
     drop_without_effect(s, space, tangent, kept);
-    for (MatrixXd& frame : tangent.frames) frame = frame(Eigen::all, kept).eval();
+    for (std::vector<MatrixXd>* frames : {&tangent.frames, &of_shown})
+      for (MatrixXd& frame : *frames) frame = frame(Eigen::all, kept).eval();
+    s.shown =
+        shown.figures(adjoint::output_values(model, scene_model.native(), *run, *shown.output()), of_shown);
     if (std::find(s.without_effect.begin(), s.without_effect.end(), used.hold) != s.without_effect.end())
       throw InputError("--hold", "'" + options.hold + "'", "a parameter that has an effect");
     if (kept.empty())
@@ -198,7 +219,10 @@ ExitCode run_sensitivity(VerbContext& context, const SensitivityOptions& options
     std::optional<VectorXd> gauge = adjoint::gauge_coordinates(model, space.jacobian());
     if (gauge) gauge = VectorXd((*gauge)(kept));
     judge(s, used, gauge);
-    if (progress.interrupted()) return ExitCode::interrupted;
+    if (progress.interrupted()) {
+      progress.note("interrupted; nothing is kept, the same command starts over");
+      return ExitCode::interrupted;
+    }
     progress.stage("adjoint", 0);
     add_map(s, scene_model, *run, options);
   } catch (const adjoint::GradientError& error) {

@@ -12,6 +12,7 @@
 #include "adjoint/surface_response.h"
 #include "sim/scene/parameter.h"
 #include "tools/study/experiment.h"
+#include "tools/study/shown_figures.h"
 #include "tools/study/study_run.h"
 #include "tools/verb.h"
 
@@ -20,6 +21,7 @@ namespace rhytid::tools {
 struct SensitivityOptions {
   StudySize size = StudySize::quick;
   std::string variant;                 ///< of an experiment; empty = the first
+  std::string shown_variant;           ///< "experiment, variant", for the page; empty for a scene
   std::vector<std::string> addresses;  ///< empty = all of the scene
   PredictedTracks tracks;
   std::string hold;             ///< address taken as known; empty = the modulus of the softest layer
@@ -39,6 +41,8 @@ struct Sensitivity {
   VectorXd held_deviations;                      ///< with it known (its own: 0)
   MatrixXd correlation;                          ///< likewise; NaN for pairs that are open
   std::vector<std::string> sentences;            ///< what positions cannot tell
+
+  std::vector<ShownFigure> shown;  ///< forces, energy, wrinkles; derivatives by `coordinates`
 
   double figure = 0;  ///< ⟨|u|²⟩ of the outer surface, mm², of the last frame or the mean over all
   VectorXd b, dJ_db;  ///< [columns] 1/mm, mm³; empty without ligaments

@@ -18,10 +18,13 @@ class SensitivityCommand final : public StudyCommand {
         "logit coordinates (places in units of half of what a fit may move them): how far a unit of each "
         "moves the outer surface; singular values of the Jacobian "
         "and the directions that positions cannot tell, by name; predicted standard deviations and "
-        "correlations under a stated noise; and, by the adjoint, where on the face the ligament parameter "
+        "correlations under a stated noise; what each changes of forces, stored energy and, with an "
+        "experiment, "
+        "of the wrinkles it measures; and, by the adjoint, where on the face the ligament parameter "
         "b matters. All to first order, at the scene's own values.",
         "a scene, a case for its scene, or experiment.json for one of its variants",
-        "sensitivity.txt and .json; parameters.csv, frames.csv, singular_values.csv, correlation.csv, "
+        "sensitivity.txt and .json; parameters.csv, frames.csv, figures.csv, singular_values.csv, "
+        "correlation.csv, "
         "map.csv; rms.svg; map.png, .vtp and .ply; response_NAME.png; index.html with all of it. Prints the "
         "text",
         "rhytid study sensitivity data/scenes/sheet_drag/scene.json -o run/sensitivity"};

@@ -57,6 +57,30 @@ std::vector<std::string> parameter_cells(const Sensitivity& s, int k) {
           deviation_text(s.held_deviations[k], c, p.unit)};
 }
 
+/// Change of a figure in the last frame per unit of coordinate k: relative for sizes.
+double change_of(const ShownFigure& figure, int k) {
+  const Eigen::Index last = figure.values.size() - 1;
+  return figure.derivatives(last, k) / (figure.relative ? figure.values[last] : 1);
+}
+
+/// Header, values and a row per parameter, strongest first, of what the last frame shows.
+std::vector<std::vector<std::string>> shown_rows(const Sensitivity& s) {
+  const auto text = [](double x, int digits) {
+    return std::isfinite(x) ? short_text(x, digits) : std::string("none");
+  };
+  std::vector<std::vector<std::string>> rows = {{"parameter"}, {"(value)"}};
+  for (const ShownFigure& figure : s.shown) {
+    rows[0].push_back(figure.name);
+    rows[1].push_back(text(figure.values[figure.values.size() - 1], 4) +
+                      (figure.unit.empty() ? "" : " " + figure.unit));
+  }
+  for (const int k : strongest_first(s)) {
+    rows.push_back({s.parameters[k].name});
+    for (const ShownFigure& figure : s.shown) rows.back().push_back(text(change_of(figure, k), 3));
+  }
+  return rows;
+}
+
 std::string figure_name(const SensitivityOptions& options) {
   return options.map_all_frames ? "mean square displacement of the outer surface over all frames"
                                 : "mean square displacement of the outer surface in the last frame";
@@ -104,6 +128,17 @@ void write_tables(const std::string& folder, const Sensitivity& s) {
     correlation.add_row(std::move(pairs));
   }
   frames.write(folder + "/frames.csv");
+  std::vector<CsvColumn> shown_columns = {{"frame", ""}, {"figure", ""}, {"unit", ""}, {"value", ""}};
+  for (const ParameterSpec& p : s.parameters) shown_columns.push_back({p.address, ""});
+  CsvTable shown(shown_columns);
+  for (const ShownFigure& figure : s.shown)
+    for (Eigen::Index f = 0; f < figure.values.size(); ++f) {
+      std::vector<CsvCell> row = {static_cast<std::int64_t>(f + 1), figure.name, figure.unit,
+                                  figure.values[f]};
+      for (const double x : figure.derivatives.row(f)) row.emplace_back(x);
+      shown.add_row(std::move(row));
+    }
+  shown.write(folder + "/figures.csv");
   directions.write(folder + "/singular_values.csv");
   correlation.write(folder + "/correlation.csv");
 }
@@ -168,6 +203,14 @@ std::string json_text(const Sensitivity& s, const SensitivityOptions& options) {
     directions.push_back({{"singular_value", s.directions.singular_values[i]},
                           {"vector", list(VectorXd(s.directions.right_vectors.col(i)))}});
   }
+  ordered_json shown = ordered_json::array();
+  for (const ShownFigure& figure : s.shown) {
+    const Eigen::Index last = figure.values.size() - 1;
+    shown.push_back({{"figure", figure.name},
+                     {"unit", figure.unit},
+                     {"value", number(figure.values[last])},
+                     {"derivatives", list(VectorXd(figure.derivatives.row(last)))}});
+  }
   const ordered_json all = {
       {"noise_mm", options.tracks.noise},
       {"tracks", options.tracks.count},
@@ -180,6 +223,7 @@ std::string json_text(const Sensitivity& s, const SensitivityOptions& options) {
       {"held", s.held >= 0 ? ordered_json(s.parameters[s.held].address) : ordered_json()},
       {"correlation", correlation},
       {"cannot_tell", s.sentences},
+      {"last_frame", shown},
       {"figure", {{"what", figure_name(options)}, {"mm2", s.figure}}}};
   return all.dump(1) + "\n";
 }
@@ -209,6 +253,15 @@ HtmlTable parameter_table(const Sensitivity& s) {
     const std::vector<std::string> cells = parameter_cells(s, k);
     table.rows.emplace_back(cells.begin(), cells.end());
   }
+  return table;
+}
+
+HtmlTable shown_table(const Sensitivity& s) {
+  const std::vector<std::vector<std::string>> rows = shown_rows(s);
+  HtmlTable table;
+  table.header = {rows[0].begin(), rows[0].end()};
+  table.caption = "What the last frame shows: change per unit of each coordinate";
+  for (std::size_t i = 1; i < rows.size(); ++i) table.rows.emplace_back(rows[i].begin(), rows[i].end());
   return table;
 }
 
@@ -254,8 +307,16 @@ std::string sensitivity_text(const Sensitivity& s, const SensitivityOptions& opt
       "a\n"
       "length for places), and predicted deviations from " +
       options.tracks.text() + "\n\n" + table.text() + "\n";
+  const std::vector<std::vector<std::string>> rows = shown_rows(s);
+  TextTable shown(rows[0]);
+  for (std::size_t i = 1; i < rows.size(); ++i) shown.add(rows[i]);
+  text +=
+      "What the last frame shows besides, and its change per unit of coordinate: relative (0.5: a per cent\n"
+      "more of the parameter is half a per cent more of the figure), direction in degrees, coherence as it "
+      "is\n\n" +
+      shown.text() + "\n";
   if (!s.without_effect.empty()) {
-    text += "Without effect:";
+    text += "Without effect on positions:";
     for (const std::string& address : s.without_effect) text += " " + address;
     text += "\n";
   }
@@ -286,7 +347,9 @@ void write_sensitivity(const std::string& folder, const SceneModel& scene_model,
 
   std::vector<std::string> names;
   for (const ParameterSpec& p : s.parameters) names.push_back(p.name);
-  HtmlPage page("Sensitivity of " + shown_name(scene_model.scene()), scene_model.scene().description);
+  HtmlPage page("Sensitivity of " + shown_name(scene_model.scene()) +
+                    (options.shown_variant.empty() ? "" : ": " + options.shown_variant),
+                scene_model.scene().description);
   page.section("parameters", "Parameters");
   page.paragraph(
       "How far a unit of each coordinate moves the outer surface (log parameters: a unit is a "
@@ -298,7 +361,18 @@ void write_sensitivity(const std::string& folder, const SceneModel& scene_model,
   page.table(parameter_table(s));
   page.svg_figure(plot, "rms and largest motion per parameter",
                   "Motion of the surface per unit, strongest first");
-  for (const std::string& address : s.without_effect) page.note(address + " has no effect.");
+  for (const std::string& address : s.without_effect) page.note(address + " has no effect on positions.");
+  page.section("shown", "Forces, energy and wrinkles");
+  page.paragraph(
+      "Figures of the last frame, and how each changes per unit of a coordinate, to first order: relative "
+      "for "
+      "sizes (0.5: a per cent more of the parameter is half a per cent more of the figure), degrees for the "
+      "direction of the waves, coherence as it is. All frames are in figures.csv, with the derivatives in "
+      "their own units per "
+      "unit of coordinate. Wrinkles are measured "
+      "where "
+      "an experiment says so.");
+  page.table(shown_table(s));
   page.section("directions", "What positions tell");
   page.paragraph("Of " + std::to_string(s.parameters.size()) + " directions, positions without noise tell " +
                  std::to_string(s.directions.rank) + ".");

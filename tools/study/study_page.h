@@ -7,6 +7,7 @@
 #include "adjoint/parameter_space.h"
 #include "sim/core/types.h"
 #include "tools/report/html.h"
+#include "tools/text_table.h"
 
 namespace rhytid::tools {
 
@@ -27,16 +28,5 @@ std::string coordinate_text(const adjoint::Coordinate& coordinate, const std::st
 /// A deviation of a coordinate as people read it: "3 %", "factor 2.1", "odds 3 %", "0.2 mm"; "open" when it is
 /// not finite and "held" when it is zero.
 std::string deviation_text(double deviation, const adjoint::Coordinate& coordinate, const std::string& unit);
-
-/// A table of aligned columns for terminals: the first to the left, the others to the right.
-class TextTable {
- public:
-  explicit TextTable(std::vector<std::string> header) : rows_{std::move(header)} {}
-  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
-  std::string text() const;  ///< widths in characters of UTF-8
-
- private:
-  std::vector<std::vector<std::string>> rows_;
-};
 
 }  // namespace rhytid::tools

@@ -65,6 +65,7 @@ StudyScene load_study_scene(VerbContext& context, StudySize size, const std::str
   std::vector<Setting> settings = chosen->settings;
   for (const std::string& text : context.options.settings) settings.push_back({text});
   result.scene = load_scene(experiment.scene, settings);
+  result.variant = experiment.name + ", " + chosen->name;
   result.measure = experiment.measure;
   result.measure_text = experiment.measure_json.dump();
   context.progress.note("variant " + chosen->name + " of " + file);
@@ -204,7 +205,8 @@ void draw_on_skin(const SceneModel& scene_model, const VectorXd& values, const s
   field.values = outer.interpolate(values);
   field.label = label;
   field.map = map;
-  if (!(values.maxCoeff() > values.minCoeff())) {  // a constant field has no range of its own
+  // A constant field has no range of its own, and rounding is none.
+  if (!(values.maxCoeff() - values.minCoeff() > 1e-9 * values.cwiseAbs().maxCoeff())) {
     field.minimum = std::min(0.0, 2 * values.minCoeff());
     field.maximum = std::max(2 * values.maxCoeff(), 1e-9);
   }

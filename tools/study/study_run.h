@@ -34,6 +34,7 @@ Shard parse_shard(const std::string& text);
 /// A scene, or one variant of an experiment with what it measures.
 struct StudyScene {
   Scene scene;
+  std::string variant;       ///< "experiment, variant"; empty for a scene alone
   WrinkleMeasure measure;    ///< of the experiment; a scene alone has no line and no window
   std::string measure_text;  ///< what a result depends on
 };

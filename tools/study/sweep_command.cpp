@@ -46,9 +46,12 @@ class SweepCommand final : public StudyCommand {
     options_.shard = parse_shard(shard_);
     const std::string& file = context.options.file;
     const bool has_sets = !grid_.empty() || !csv_.empty();
-    if (!has_sets) return run_sweep(context, load_experiment(file, size()), options_);
+    if (!has_sets)
+      return run_sweep(context, load_experiment(file, size(), ", or a scene with --grid or --csv"), options_);
     const std::vector<ParameterSet> sets = csv_.empty() ? grid_sets(grid_) : table_sets(csv_);
-    const Experiment base = is_experiment(file) ? load_experiment(file, size()) : experiment_of_scene(file);
+    const bool has_variants = is_experiment(file);
+    if (!has_variants) refuse_case(file);
+    const Experiment base = has_variants ? load_experiment(file, size()) : experiment_of_scene(file);
     return run_sweep(context, with_parameter_sets(base, sets), options_);
   }
 

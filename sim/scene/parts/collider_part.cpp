@@ -69,7 +69,8 @@ ColliderPart::ColliderPart(const Scene& scene) {
 
 void ColliderPart::add_native_blocks(const Scene& scene, Model& model) const {
   for (const ColliderScene& c : scene.colliders) {
-    add_native_block(model, "collider/" + c.name, first_size(c, ColliderMotion(c)) + num_sizes(c), {0});
+    add_native_block(model, "collider/" + c.name,
+                     first_size(c, ColliderMotion(c, scene.time.offset)) + num_sizes(c), {0});
   }
 }
 
@@ -83,7 +84,7 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
     model.shapes.push_back(collider_shape(c));
     const ImplicitShape* shape = model.shapes.back().get();
     const int base = model.native_block("collider/" + c.name).offset;
-    const ColliderMotion motion(c);
+    const ColliderMotion motion(c, scene.time.offset);
     using enum ThetaSlot::Kind;
     const auto add_size_slots = [&](TermGroup& g) {
       for (int k = 0; k < num_sizes(c); ++k)
@@ -97,6 +98,7 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
       add_orientation_slots(c, motion, path_now, base, g);
       add_size_slots(g);
       term.add_group(std::move(g));
+      term.set_clock(model.clock);
       contact.terms.push_back(static_cast<int>(model.terms.size()));
       contact.shapes.push_back(static_cast<int>(model.shapes.size()) - 1);
       model.terms.push_back(std::move(term));
@@ -111,6 +113,7 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
       for (const ThetaSlot::Kind kind : {path_now, path_old}) add_orientation_slots(c, motion, kind, base, g);
       add_size_slots(g);
       term.add_group(std::move(g));
+      term.set_clock(model.clock);
       friction.terms.push_back(static_cast<int>(model.terms.size()));
       model.terms.push_back(std::move(term));
     }
@@ -131,7 +134,7 @@ void ColliderPart::set_native(const Scene& scene, const Model& model, VectorXd& 
     native[at + 2] = c.friction ? c.friction->coefficient : 0;
     for (std::size_t i = 0; i < c.path.size(); ++i)
       native.segment<3>(static_cast<Eigen::Index>(at + 3 + 3 * i)) = c.path[i].position;
-    const ColliderMotion motion(c);
+    const ColliderMotion motion(c, scene.time.offset);
     for (std::size_t i = 0; i < motion.quaternions().size(); ++i)
       native.segment<4>(static_cast<Eigen::Index>(at + first_orientation(c)) +
                         4 * static_cast<Eigen::Index>(i)) = motion.quaternions()[i];
@@ -158,7 +161,8 @@ bool ColliderPart::add_derivative(const Scene& scene, const Model& model, const 
       return true;
     }
     if (std::sscanf(key.c_str(), "semi_axes/%d%n", &axis, &end) == 1 && end == static_cast<int>(key.size())) {
-      d[model.native_block("collider/" + c.name).offset + first_size(c, ColliderMotion(c)) + axis] = 1;
+      d[model.native_block("collider/" + c.name).offset +
+        first_size(c, ColliderMotion(c, scene.time.offset)) + axis] = 1;
       return true;
     }
     if (slot < 0) continue;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
@@ -81,6 +82,24 @@ TEST(FrameSource, SixteenBitKeepsItsDigits) {
   FrameSource source(at(folder.file("deep.png")));
   EXPECT_NEAR(cv::mean(source.next()->grey)[0], 12345 * 255.0 / 65535, 1e-4);
   EXPECT_NEAR(source.quantum(), 1.0 / 257, 1e-12);
+}
+
+TEST(FrameSource, AGapInNumberedStillsIsNoEnd) {
+  FootageFolder folder;
+  for (const int number : {0, 1, 3, 12})
+    cv::imwrite(folder.file("g_" + std::to_string(number) + ".png"), flat(number));
+  EXPECT_THAT(refusal(at(folder.file("g_%d.png"))), HasSubstr("g_2.png before"));
+  EXPECT_THAT(refusal(at(folder.file("g_%d.png"))), HasSubstr("g_3.png, expected a sequence without gaps"));
+  FrameSourceOptions before = at(folder.file("g_%d.png"));
+  before.last = 1;
+  EXPECT_EQ(FrameSource(before).frames_asked(), 2) << "frames after the last that is wanted do not matter";
+  // Files that the pattern does not name.
+  std::filesystem::remove(folder.file("g_3.png"));
+  std::filesystem::remove(folder.file("g_12.png"));
+  cv::imwrite(folder.file("g_7.tif"), flat(7));
+  cv::imwrite(folder.file("g_007.png"), flat(7));
+  cv::imwrite(folder.file("g_mask.png"), flat(7));
+  EXPECT_THAT(means(at(folder.file("g_%d.png"))), ElementsAre(0, 1));
 }
 
 TEST(FrameSource, NamesWhatIsWrong) {

@@ -38,20 +38,20 @@ const std::string kTurning =
 
 TEST(ColliderMotion, TurnsAtConstantSpeedBetweenKnots) {
   const Scene scene = scene_with({kTurning});
-  const ColliderMotion motion(scene.colliders[0]);
+  const ColliderMotion motion(scene.colliders[0], 0);
   for (const double t : {0.0, 0.25, 0.7, 1.0}) {
     const BodyPose pose = motion.at(t);
     const Mat3 expected = Eigen::AngleAxisd(t * std::numbers::pi / 2, Vec3::UnitX()).toRotationMatrix();
     EXPECT_LT((pose.rotation - expected).norm(), 1e-14);
     EXPECT_NEAR(pose.centre[0], 2 * t, 1e-15);
   }
-  EXPECT_EQ(ColliderMotion(scene_with({}).colliders[0]).orientations(), nullptr);
+  EXPECT_EQ(ColliderMotion(scene_with({}).colliders[0], 0).orientations(), nullptr);
 }
 
 TEST(ColliderMotion, TermsSeeTheSamePoses) {
   for (const char* kind : {"linear", "spline", "clamped_spline"}) {
     const SceneModel m(scene_with({kTurning, std::string("/colliders/finger/interpolation=") + kind}));
-    const ColliderMotion motion(m.scene().colliders[0]);
+    const ColliderMotion motion(m.scene().colliders[0], 0);
     for (const Term& term : m.model().terms) {
       if (term.name() != "contact finger") continue;
       const double t = 0.37;

@@ -56,9 +56,10 @@ TEST(Parameter, DescribesByNameAndByNumber) {
 }
 
 // 2 layers x 5, ligaments 2 + 2 sources, base, finger 3, table 1 (a plane without friction has no radius);
-// components of a source's position (the other one is at a vertex), of two knots and of one.
+// components of a source's position (the other one is at a vertex), of two knots and of one; the clock of what
+// moves.
 TEST(Parameter, ListsAllOfTheScene) {
-  EXPECT_EQ(all_parameters(full()).size(), 2 * 5 + 2 + 2 + 1 + 3 + 1 + 3 * (1 + 2 + 1u));
+  EXPECT_EQ(all_parameters(full()).size(), 2 * 5 + 2 + 2 + 1 + 3 + 1 + 3 * (1 + 2 + 1u) + 1);
   EXPECT_EQ(all_parameters(parse_scene_text(testing::minimal_scene, "m.json")).size(), 5u);
 }
 

@@ -48,6 +48,42 @@ TEST(KnotPath, SplinesReproduceWhatTheyCan) {
   }
 }
 
+// Against central differences where paths are smooth; one-sided at kinks; nothing outside.
+TEST(KnotPath, RatesAreTheDerivatives) {
+  const VectorXd knots = (VectorXd(6) << 1, -2, 0.5, 3, 3, 7).finished();
+  const auto rate = [&](const KnotPath& path, double t, KnotPath::Side side = KnotPath::Side::mean) {
+    double sum = 0;
+    for (const KnotWeight& w : path.rates(t, side)) sum += w.weight * knots[w.knot];
+    return sum;
+  };
+  const std::vector<KnotPath> paths = {KnotPath(kTimes), KnotPath(kTimes, PathKind::spline),
+                                       KnotPath(kTimes, PathKind::clamped_spline),
+                                       KnotPath(kTimes, std::vector<double>{0.5, 1e-5, 1.2, 0, 0.9})};
+  const double h = 1e-5;
+  for (std::size_t k = 0; k < paths.size(); ++k) {
+    const KnotPath& path = paths[k];
+    for (const double t : {0.1, 0.44, 0.77, 1.2, 1.9}) {
+      const double central = (value(path, knots, t + h) - value(path, knots, t - h)) / (2 * h);
+      EXPECT_NEAR(rate(path, t), central, 1e-6) << k << " at " << t;
+    }
+    EXPECT_TRUE(path.rates(-0.1).empty());
+    EXPECT_TRUE(path.rates(2.1).empty());
+    for (const double knot : kTimes) {
+      const double before = rate(path, knot, KnotPath::Side::before),
+                   after = rate(path, knot, KnotPath::Side::after);
+      EXPECT_NEAR(before, rate(path, knot - 1e-8), 1e-4);
+      EXPECT_NEAR(after, rate(path, knot + 1e-8), 1e-4);
+      EXPECT_NEAR(rate(path, knot), 0.5 * (before + after), 1e-12);
+      const bool is_inside = knot > 0 && knot < 2, is_spline = k == 1 || k == 2;
+      if (k == 2 || (is_spline && is_inside)) {
+        EXPECT_NEAR(before, after, 1e-9) << knot;
+      }
+    }
+  }
+  EXPECT_EQ(rate(paths[0], 0.3, KnotPath::Side::before), -10);
+  EXPECT_EQ(rate(paths[0], 0, KnotPath::Side::before), 0);
+}
+
 TEST(KnotPath, SplinesAreTwiceDifferentiable) {
   const VectorXd knots = (VectorXd(6) << 1, -2, 0.5, 3, 3, 7).finished();
   const double h = 1e-4;

@@ -1,0 +1,283 @@
+#include "fitting/fit_summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "sim/scene/names.h"
+#include "sim/scene/parameter.h"
+
+namespace rhytid::fitting {
+namespace {
+
+std::string number(const char* pattern, double x) {
+  char text[64];
+  std::snprintf(text, sizeof(text), pattern, x);
+  return text;
+}
+
+/// Of one clip with one camera a result says nothing by clips.
+bool is_plain(const JointProblem& problem) {
+  return problem.num_clips() == 1 && problem.clip(0).cameras().size() == 1;
+}
+
+/// Where the common misfit of neighbours decides the interval, and by how much.
+std::string which_are_wider(const Identifiability& found, const std::vector<FitVariable>& variables) {
+  std::string list;
+  for (int k = 0; k < static_cast<int>(variables.size()); ++k) {
+    const double ratio = found.widened_by_misfit(k);
+    if (ratio > 1 + 1e-9)
+      list += (list.empty() ? "" : ", ") + variables[k].name + number(" %.2f times", ratio) +
+              number(" on %.3g degrees of freedom",
+                     found.degrees(VectorXd::Unit(static_cast<Eigen::Index>(variables.size()), k)));
+  }
+  return list.empty() ? "nowhere here" : "here " + list;
+}
+
+void note_tracks_left_out(const FitProblem& clip, const FitCase& options, FitResult& result) {
+  const RegistrationReport& r = clip.registration().report;
+  if (r.left_out() == 0) return;
+  const std::string where = clip.name.empty() ? "" : "Clip " + clip.name + ": ";
+  result.notes.push_back(
+      where + std::to_string(r.left_out()) + " tracks left out: " + std::to_string(r.not_seen) +
+      " not seen in frame 0 (tracks that begin later are not attached), " + std::to_string(r.missed_mesh) +
+      " beside the skin, " + std::to_string(r.back_side) + " on its back, " + std::to_string(r.near_rim) +
+      " nearer than " + number("%.3g", options.rim_margin) + " mm to the rim, " +
+      std::to_string(r.not_refined) + " on a silhouette.");
+}
+
+/// Residuals of one clip, its squares summed into `clip`.
+void add_clip(const TrackSet& tracks, const FitProblem& problem, const FitEvaluation& at, int number,
+              FittedClip& clip, FitResult& result) {
+  clip.name = problem.name;
+  clip.num_tracks = static_cast<int>(problem.compared().size());
+  clip.tracks_left_out = problem.registration().report.left_out();
+  clip.num_observations = problem.num_observations();
+  clip.frames = problem.frames();
+  clip.cost = at.cost;
+  for (const Camera& camera : problem.cameras()) clip.views.emplace_back().camera = camera.name;
+  for (std::size_t i = 0; i < problem.compared().size(); ++i) {
+    const FitProblem::ComparedTrack& c = problem.compared()[i];
+    FittedView& view = clip.views[c.camera];
+    ++view.num_tracks;
+    for (std::size_t j = 0; j < c.frames.size(); ++j) {
+      const Vec2 difference = at.differences[i].segment<2>(2 * j);
+      const Vec2 predicted = c.observed[j] - difference;
+      view.rms_px += difference.squaredNorm();
+      ++view.num_observations;
+      result.residuals.push_back({.frame = c.frames[j],
+                                  .track = tracks.tracks[c.track].id,
+                                  .x_px = c.observed[j].x(),
+                                  .y_px = c.observed[j].y(),
+                                  .predicted_x_px = predicted.x(),
+                                  .predicted_y_px = predicted.y(),
+                                  .weight = at.tracks[i].weights[j],
+                                  .clip = number,
+                                  .view = c.camera});
+    }
+  }
+  for (FittedView& view : clip.views) {
+    clip.rms_px += view.rms_px;
+    view.rms_px = std::sqrt(view.rms_px / std::max(1, view.num_observations));
+  }
+  clip.rms_px = std::sqrt(clip.rms_px / std::max(1, clip.num_observations));
+}
+
+}  // namespace
+
+NoiseCheck check_noise(JointProblem& problem, const VectorXd& t, const VectorXd& whitened) {
+  NoiseCheck check;
+  check.reduced_chi_square = whitened.squaredNorm() / std::max(1, problem.degrees_of_freedom());
+  std::vector<MatrixXd> innovations;
+  std::vector<std::vector<int>> frames;
+  for (int c = 0; c < problem.num_clips(); ++c) {
+    FitProblem& clip = problem.clip(c);
+    const FitEvaluation& at = clip.evaluate(problem.of_clip(c, t));
+    for (std::size_t i = 0; i < clip.compared().size(); ++i) {
+      innovations.push_back(clip.noise()[i].innovations(at.differences[i], at.tracks[i]));
+      frames.push_back(clip.compared()[i].frames);
+    }
+  }
+  check.autocorrelation = lag_one_autocorrelation(innovations, frames);
+  check.widening = interval_widening(check.reduced_chi_square, check.autocorrelation);
+  return check;
+}
+
+std::vector<WhitenedTrack> whitened_tracks(const JointProblem& problem, const FitProblem::Linearised& at) {
+  std::vector<WhitenedTrack> tracks;
+  Eigen::Index first_row = 0;
+  for (int c = 0; c < problem.num_clips(); ++c) {
+    const FitProblem& clip = problem.clip(c);
+    const std::vector<Vec3> points = clip.rest_points();
+    int shifts = 0;
+    for (const TrackNoise& noise : clip.noise()) shifts = std::max(shifts, noise.num_shifts());
+    const int per_camera = 2 * (clip.frames() + shifts + 1);
+    Eigen::Index row = first_row;
+    for (std::size_t i = 0; i < clip.compared().size(); ++i) {
+      const FitProblem::ComparedTrack& seen = clip.compared()[i];
+      const TrackNoise& noise = clip.noise()[i];
+      const Eigen::Index n = noise.num_rows();
+      WhitenedTrack track{is_plain(problem) ? Vec3(seen.first.x(), seen.first.y(), 0) : points[i],
+                          {},
+                          at.jacobian.middleRows(row, n),
+                          at.residuals.segment(row, n),
+                          c};
+      const int offset = seen.camera * per_camera;
+      for (const int frame : seen.frames)
+        for (const int axis : {0, 1}) track.rows.push_back(offset + 2 * frame + axis);
+      for (int shift = 0; shift < noise.num_shifts(); ++shift)
+        for (const int axis : {0, 1})
+          track.rows.push_back(offset + (shift == 0 ? axis : 2 * (clip.frames() + shift) + axis));
+      tracks.push_back(std::move(track));
+      row += n;
+    }
+    first_row += clip.num_residuals();  // priors lie between the clips
+  }
+  return tracks;
+}
+
+std::map<std::string, double> truth_in_gauge(const JointFitInput& input, const JointProblem& problem,
+                                             FitResult& result) {
+  std::map<std::string, double> truth = input.truth;
+  const std::string gauge = "/skin/layers/" + problem.gauge_layer() + "/youngs_modulus";
+  const auto known = truth.find(gauge);
+  if (known == truth.end() || problem.modulus_variable(problem.gauge_layer()) >= 0) return truth;
+  const double factor = get_parameter(input.clips[0].scene, gauge) / known->second;
+  if (std::fabs(factor - 1) < 1e-12) return truth;
+  for (auto& [address, value] : truth)
+    if (address.ends_with("/youngs_modulus") || address.ends_with("/stiffness")) value *= factor;
+  result.notes.push_back("True stiffnesses were multiplied by " + number("%.6g", factor) +
+                         " for the comparison: the truth's modulus of layer " + problem.gauge_layer() +
+                         " is not the one held.");
+  return truth;
+}
+
+void add_modulus_ratios(const JointProblem& problem, const Identifiability& found, const VectorXd& t,
+                        const std::map<std::string, double>& truth, FitResult& result) {
+  const Scene scene = problem.clip(0).parametrisation().scene(problem.of_clip(0, t));
+  const std::string base = problem.gauge_layer();
+  const auto modulus = [&](const std::string& layer) {
+    return get_parameter(scene, "/skin/layers/" + layer + "/youngs_modulus");
+  };
+  const auto true_modulus = [&](const std::string& layer) {
+    const auto known = truth.find("/skin/layers/" + layer + "/youngs_modulus");
+    return known == truth.end() ? std::numeric_limits<double>::quiet_NaN() : known->second;
+  };
+  for (const LayerScene& layer : scene.skin.layers) {
+    if (layer.name == base) continue;
+    VectorXd g = VectorXd::Zero(problem.num_parameters());  // of ln(E_layer / E_base) by t
+    const int above = problem.modulus_variable(layer.name), below = problem.modulus_variable(base);
+    if (above < 0 && below < 0) continue;
+    if (above >= 0) g[above] += problem.variables()[above].derivative(t[above]) / modulus(layer.name);
+    if (below >= 0) g[below] -= problem.variables()[below].derivative(t[below]) / modulus(base);
+    const double half = found.half_width(g);
+    DerivedQuantity ratio{.name = "Young's modulus " + layer.name + " / " + base,
+                          .unit = "",
+                          .value = modulus(layer.name) / modulus(base),
+                          .truth = {}};
+    ratio.low95 = ratio.value * std::exp(-half);
+    ratio.high95 = ratio.value * std::exp(half);
+    const double true_ratio = true_modulus(layer.name) / true_modulus(base);
+    if (std::isfinite(true_ratio)) ratio.truth = true_ratio;
+    result.derived.push_back(std::move(ratio));
+  }
+}
+
+void add_parameters(const JointProblem& problem, const VectorXd& t, const Identifiability* found,
+                    const std::map<std::string, double>& truth, FitResult& result) {
+  const VectorXd lower = problem.lower(), upper = problem.upper();
+  for (int k = 0; k < problem.num_parameters(); ++k) {
+    const FitVariable& v = problem.variables()[k];
+    FittedParameter f{.address = v.address,
+                      .name = v.name,
+                      .unit = v.unit,
+                      .transform = to_string(v.transform),
+                      .initial = v.initial,
+                      .value = std::clamp(v.to_parameter(t[k]), v.lower, v.upper),
+                      .lower = v.lower,
+                      .upper = v.upper,
+                      .truth = {}};
+    const double range = upper[k] - lower[k];
+    f.at_bound = std::min(t[k] - lower[k], upper[k] - t[k]) < 1e-6 * range;
+    f.sigma = found != nullptr ? found->sigma(k) : std::numeric_limits<double>::infinity();
+    f.determined = found != nullptr && found->determined(k);
+    const double half = found != nullptr ? found->half_width(k) : f.sigma;
+    f.low95 = std::isfinite(half) ? std::max(v.lower, v.to_parameter(t[k] - half)) : v.lower;
+    f.high95 = std::isfinite(half) ? std::min(v.upper, v.to_parameter(t[k] + half)) : v.upper;
+    if (!std::isfinite(f.sigma)) f.sigma = std::numeric_limits<double>::quiet_NaN();
+    if (f.at_bound)
+      result.cannot_tell.push_back(v.name + " ended at its bound " + number("%.4g", f.value) + " " + v.unit +
+                                   ": the data ask for a value beyond it, its interval is only a hint.");
+    if (const auto known = truth.find(v.address); known != truth.end()) f.truth = known->second;
+    result.parameters.push_back(std::move(f));
+  }
+}
+
+void add_residuals(const JointFitInput& input, JointProblem& problem, const VectorXd& t, FitResult& result) {
+  double sum = 0;
+  for (int c = 0; c < problem.num_clips(); ++c) {
+    FittedClip clip;
+    add_clip(input.clips[c].tracks, problem.clip(c), problem.clip(c).evaluate(problem.of_clip(c, t)), c, clip,
+             result);
+    if (!is_plain(problem)) result.clips.push_back(std::move(clip));
+  }
+  for (const FitResidual& r : result.residuals)
+    sum += Vec2(r.x_px - r.predicted_x_px, r.y_px - r.predicted_y_px).squaredNorm();
+  result.rms_px = std::sqrt(sum / std::max<std::size_t>(1, result.residuals.size()));
+}
+
+void add_clip_chi_squares(const JointProblem& problem, const FitProblem::Linearised& at,
+                          const Identifiability& found, FitResult& result) {
+  Eigen::Index row = 0;
+  for (std::size_t c = 0; c < result.clips.size(); ++c) {
+    const FitProblem& problem_c = problem.clip(static_cast<int>(c));
+    FittedClip& clip = result.clips[c];
+    Eigen::Index rows = 0;  // of tracks; priors follow them
+    for (const TrackNoise& noise : problem_c.noise()) rows += noise.num_rows();
+    const double used = (at.jacobian.middleRows(row, rows) * found.basis()).squaredNorm();
+    clip.degrees_of_freedom = std::max(1.0, 2 * clip.num_observations - used);
+    clip.reduced_chi_square = at.residuals.segment(row, rows).squaredNorm() / clip.degrees_of_freedom;
+    row += problem_c.num_residuals();
+  }
+}
+
+void add_notes(const JointFitInput& input, JointProblem& problem, const VectorXd& t, bool has_point,
+               FitResult& result) {
+  for (int c = 0; c < problem.num_clips(); ++c) note_tracks_left_out(problem.clip(c), input.options, result);
+  result.notes.push_back(
+      "Each track is weighted by its own covariance in every frame; the error of its first pixel, which "
+      "places "
+      "its material point, is carried into all its frames. Together they count as at least " +
+      number("%.3g", input.options.min_sigma) + " px per axis.");
+  if (input.options.robust_scale > 0 && has_point) {
+    int discounted = 0;
+    for (int c = 0; c < problem.num_clips(); ++c)
+      for (const TrackNoise::Evaluation& track : problem.clip(c).evaluate(problem.of_clip(c, t)).tracks)
+        discounted += static_cast<int>(
+            std::count_if(track.weights.begin(), track.weights.end(), [](double w) { return w < 1; }));
+    result.notes.push_back("Huber loss beyond " + number("%.3g", input.options.robust_scale) +
+                           " standard deviations; " + std::to_string(discounted) + " of " +
+                           std::to_string(problem.num_observations()) + " observations were discounted.");
+  }
+  result.notes.push_back("Damper scheme: " + to_string(input.clips[0].scene.time.damper) +
+                         "; relaxation times and fractions depend on it.");
+  for (const std::string& sentence : problem.differences()) result.notes.push_back("Warning: " + sentence);
+  if (problem.gauge_is_free())
+    result.notes.push_back(
+        "Warning: every stiffness is fitted and there are no force data: absolute values are arbitrary, only "
+        "ratios are meaningful. Leave one Young's modulus out of the fitted parameters.");
+}
+
+std::string interval_note(const JointProblem& problem, const NoiseCheck& noise,
+                          const Identifiability& found) {
+  return "95 % intervals: Student's t on " + std::to_string(problem.degrees_of_freedom()) +
+         " degrees of freedom, standard deviations widened by " + number("%.3f", noise.widening) +
+         " (reduced chi-square " + number("%.3f", noise.reduced_chi_square) +
+         ", lag-1 autocorrelation of whitened residuals within tracks " +
+         number("%.3f", noise.autocorrelation) +
+         "), or what neighbouring tracks err alike where that is more (" +
+         which_are_wider(found, problem.variables()) + ").";
+}
+
+}  // namespace rhytid::fitting
