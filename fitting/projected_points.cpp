@@ -4,7 +4,7 @@
 
 namespace rhytid::fitting {
 
-ProjectedPoints::ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points,
+ProjectedPoints::ProjectedPoints(const SkinMesh& mesh, const std::vector<adjoint::MaterialPoint>& points,
                                  Camera camera, std::vector<std::vector<int>> points_in_frame)
     : ProjectedPoints(mesh, points, std::vector<Camera>{std::move(camera)},
                       std::vector<int>(points.size(), 0), std::move(points_in_frame)) {}

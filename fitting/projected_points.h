@@ -16,7 +16,7 @@ class ProjectedPoints final : public adjoint::Output {
  public:
   /// `points_in_frame[f]` lists indices of `points` wanted in frame f; frames beyond the list want none.
   /// Throws ContractError on indices out of range.
-  ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points, Camera camera,
+  ProjectedPoints(const SkinMesh& mesh, const std::vector<adjoint::MaterialPoint>& points, Camera camera,
                   std::vector<std::vector<int>> points_in_frame);
   /// The same with several cameras: `camera_of_point` [points] indexes them.
   ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::MaterialPoint> points,
