@@ -43,6 +43,7 @@ FitCase read_fit(const json& j) {
   c.robust_scale = j["robust_scale"], c.min_sigma = j["min_sigma"];
   c.first_frame = j["first_frame"], c.last_frame = j["last_frame"];
   c.rim_margin = j["rim_margin"], c.gauge_layer = j["gauge_layer"];
+  c.discretisation_check = j["discretisation_check"];
   return c;
 }
 

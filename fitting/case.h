@@ -67,6 +67,8 @@ struct FitCase {
   double min_sigma = 0.05;  ///< px, floor of the standard deviation of a displacement since frame 0, per axis
   int first_frame = 1, last_frame = 0;  ///< frames used, 0 = all
   double rim_margin = 1;                ///< mm: tracks closer to the rim of the patch are left out
+  /// Whether what the discretisation does to the answer is estimated, and enters the intervals.
+  bool discretisation_check = true;
   /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden
   /// yardstick.
   std::string gauge_layer;  ///< layer whose modulus is fixed; default: the innermost

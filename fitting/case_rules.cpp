@@ -287,6 +287,11 @@ std::vector<Rule> fit_rules() {
        .fallback = c.rim_margin,
        .min = 0,
        .doc = "Tracks nearer to the rim of the patch are left out."},
+      {.pointer = "/fit/discretisation_check",
+       .type = RuleType::boolean,
+       .fallback = c.discretisation_check,
+       .doc = "Whether the answer is predicted again with finer elements and steps, one run each, and what "
+              "that moves enters the intervals."},
       {.pointer = "/fit/gauge_layer",
        .type = RuleType::string,
        .fallback = c.gauge_layer,

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <deque>
-#include <filesystem>
 
+#include "fitting/discretisation.h"
+#include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
 #include "sim/core/error.h"
 
@@ -32,37 +32,17 @@ std::string status_text(const OptimiserOutcome& outcome) {
   return "failed: " + outcome.detail;
 }
 
-/// Opens the logs of all clips.
-std::deque<EvaluationLog> open_logs(const JointFitInput& input, JointProblem& problem,
-                                    const std::function<void(const std::string&)>& note) {
-  std::deque<EvaluationLog> logs;
-  if (input.evaluations.empty()) return logs;
-  for (int c = 0; c < problem.num_clips(); ++c) {
-    const std::string& name = problem.name(c);
-    const std::string folder = problem.num_clips() == 1
-                                   ? input.evaluations
-                                   : (std::filesystem::path(input.evaluations) / name).string();
-    EvaluationLog& log =
-        logs.emplace_back(folder, fit_identity(input.clips[c], input.options, problem.clip(c)), input.anew);
-    log.warn = note;
-    problem.clip(c).log = &log;
-    note(log.set_aside());
-    if (log.num_runs() > 0)
-      note("resumed: " + std::to_string(log.num_runs()) + " runs of an earlier start are in " + folder);
-  }
-  return logs;
-}
-
 /// Where the best point was found: its fit, with intervals where there is a derivative.
 void describe_best(const JointFitInput& input, JointProblem& problem, const VectorXd& t, bool have_point,
-                   FitResult& result) {
+                   const FitObserver& observer, FitResult& result) {
   const auto linearised = have_point ? problem.linearised(t) : std::nullopt;
   const bool is_there = have_point && !problem.evaluate(t).failed;  // else stopped while it was run again
-  if (problem.was_stopped()) {
+  const auto stop_here = [&result] {
     result.converged = false;
     result.status = "failed: stopped by the user";
     result.stopped = true;
-  }
+  };
+  if (problem.was_stopped()) stop_here();
   if (is_there) {
     result.final_cost = problem.evaluate(t).cost;
     add_residuals(input, problem, t, result);
@@ -83,11 +63,19 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Vect
   }
   const NoiseCheck noise = check_noise(problem, t, linearised->residuals);
   result.reduced_chi_square = noise.reduced_chi_square;
-  const Identifiability found(linearised->jacobian, problem.variables(), noise.widening,
-                              problem.degrees_of_freedom(), whitened_tracks(problem, *linearised));
+  Identifiability found(linearised->jacobian, problem.variables(), noise.widening,
+                        problem.degrees_of_freedom(), whitened_tracks(problem, *linearised));
+  if (input.options.discretisation_check) {
+    result.discretisation =
+        discretisation_shifts(input, problem, t, *linearised, found.basis(), observer);
+    for (const DiscretisationShift& d : result.discretisation)
+      if (d.failure.empty()) found.add_systematic(d.shift);
+    if (result.discretisation.empty()) stop_here();
+  }
   add_parameters(problem, t, &found, truth, result);
   add_modulus_ratios(problem, found, t, truth, result);
   add_clip_chi_squares(problem, *linearised, found, result);
+  add_discretisation_notes(result);
   result.singular_values = found.singular_values();
   result.right_vectors = found.right_vectors();
   result.correlation = found.correlation();
@@ -132,7 +120,7 @@ FitResult run_fit(const JointFitInput& input, const FitObserver& observer) {
   const auto note = [&observer](const std::string& text) {
     if (observer.note && !text.empty()) observer.note(text);
   };
-  const std::deque<EvaluationLog> logs = open_logs(input, problem, note);
+  const FitLogs logs(input, problem, note);
   if (input.options.optimiser != "ceres" && input.options.optimiser != "nlopt")
     throw InputError("fit: optimiser", "'" + input.options.optimiser + "'", "ceres or nlopt");
   const OptimiserOptions options{.max_evaluations = input.options.max_evaluations};
@@ -151,7 +139,7 @@ FitResult run_fit(const JointFitInput& input, const FitObserver& observer) {
   result.final_cost = search.best_cost();
   const bool has_best = search.best().size() > 0;
   describe_best(input, problem, has_best ? search.all(search.best()) : problem.initial(),
-                has_best && !problem.was_stopped(), result);
+                has_best && !problem.was_stopped(), observer, result);
   add_counts(problem, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;

@@ -76,6 +76,38 @@ std::string clip_table(const FitResult& result) {
   return layout(rows);
 }
 
+/// By how much each finer variant would move the parameters: per cent, or the parameter's unit where it is
+/// fitted as it is.
+std::string shift_table(const FitResult& result) {
+  std::vector<Row> rows = {{"would move by", "unit"}};
+  std::string text;
+  for (const DiscretisationShift& d : result.discretisation) {
+    if (d.failure.empty())
+      rows[0].push_back(d.name);
+    else
+      text += "Not checked: " + d.change + ": " + d.failure + "\n";
+  }
+  if (rows[0].size() == 2) return text;
+  for (std::size_t k = 0; k < result.parameters.size(); ++k) {
+    const FittedParameter& p = result.parameters[k];
+    const bool is_log = p.transform == "log";
+    Row row = {p.name, is_log ? "%" : p.transform == "none" ? p.unit : "logit"};
+    for (const DiscretisationShift& d : result.discretisation)
+      if (d.failure.empty()) {
+        char moved[32];
+        std::snprintf(moved, sizeof(moved), is_log ? "%+.1f" : "%+.3g",
+                      is_log ? 100 * std::expm1(d.shift[k]) : d.shift[k]);
+        row.push_back(moved);
+      }
+    rows.push_back(std::move(row));
+  }
+  text += layout(rows);
+  for (const DiscretisationShift& d : result.discretisation)
+    if (d.failure.empty())
+      text += d.name + ": " + d.change + " (moves the points by " + number(d.rms_px) + " px)\n";
+  return text;
+}
+
 }  // namespace
 
 std::string answer_text(const FitResult& result) {
@@ -97,6 +129,7 @@ std::string answer_text(const FitResult& result) {
           " tracks, reduced chi-square " + number(result.reduced_chi_square) + ".\n";
   if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";
+  if (!result.discretisation.empty()) text += "\n" + shift_table(result);
   for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";
   return text;
 }

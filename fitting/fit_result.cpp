@@ -61,6 +61,16 @@ void iteration_fields(Archive& field, Record& i) {
 }
 
 template <class Archive, class Record>
+void shift_fields(Archive& field, Record& d) {
+  field("name", d.name);
+  field("change", d.change);
+  field("failure", d.failure);
+  field("rms_px", d.rms_px);
+  field("seconds", d.seconds);
+  field("shift", d.shift);
+}
+
+template <class Archive, class Record>
 void view_fields(Archive& field, Record& v) {
   field("camera", v.camera);
   field("num_tracks", v.num_tracks);
@@ -111,6 +121,7 @@ void result_fields(Archive& field, Record& r) {
   field("seconds", r.seconds);
   field("forward_seconds", r.forward_seconds);
   field("history", r.history);
+  field.optional("discretisation", r.discretisation);
   field("singular_values", r.singular_values);
   field("right_vectors", r.right_vectors);
   field("correlation", r.correlation);
@@ -171,6 +182,11 @@ class Writer {
   static Json json(const FitIteration& v) {
     Writer w;
     iteration_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const DiscretisationShift& v) {
+    Writer w;
+    shift_fields(w, v);
     return std::move(w.out);
   }
   static Json json(const FittedView& v) {
@@ -272,6 +288,10 @@ class Reader {
     Reader r(j, where);
     iteration_fields(r, v);
   }
+  static void read(const Json& j, DiscretisationShift& v, const std::string& where) {
+    Reader r(j, where);
+    shift_fields(r, v);
+  }
   static void read(const Json& j, FittedView& v, const std::string& where) {
     Reader r(j, where);
     view_fields(r, v);
@@ -302,6 +322,10 @@ void check_sizes(const FitResult& result, const std::string& where) {
   check("right_vectors", result.right_vectors.rows(), result.right_vectors.cols(), n);
   check("correlation", result.correlation.rows(), result.correlation.cols(), n);
   if (result.singular_values.size() > 0) check("singular_values", result.singular_values.size(), 1, 1);
+  for (size_t i = 0; i < result.discretisation.size(); ++i) {
+    const auto size = static_cast<Eigen::Index>(result.discretisation[i].shift.size());
+    if (size > 0) check(("discretisation/" + std::to_string(i) + "/shift").c_str(), size, 1, 1);
+  }
   for (size_t i = 0; i < result.history.size(); ++i) {
     const auto size = static_cast<Eigen::Index>(result.history[i].values.size());
     if (size > 0) check(("history/" + std::to_string(i) + "/values").c_str(), size, 1, 1);

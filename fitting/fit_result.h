@@ -13,9 +13,10 @@ namespace rhytid::fitting {
 struct FittedParameter {
   std::string address, name, unit, transform;           ///< transform: none | log | logit
   double initial = 0, value = 0, lower = 0, upper = 0;  ///< internal units
-  double sigma = 0;  ///< standard deviation in the transformed parameter (log: relative); NaN = undetermined
-  /// 95 % interval in the parameter itself, internal units: a quantile of Student's t times sigma on either
-  /// side, with the degrees of freedom that sigma has.
+  /// Standard deviation in the transformed parameter (log: relative), the shifts of the discretisation
+  /// included; NaN = undetermined.
+  double sigma = 0;
+  /// 95 % interval in the parameter itself, internal units (identifiability.h).
   double low95 = 0, high95 = 0;
   bool at_bound = false, determined = true;
   std::optional<double> truth;  ///< known in twin experiments
@@ -26,6 +27,16 @@ struct DerivedQuantity {
   std::string name, unit;
   double value = 0, low95 = 0, high95 = 0;
   std::optional<double> truth;
+};
+
+/// By how much the answer would move with one kind of step of the discretisation finer (discretisation.h).
+struct DiscretisationShift {
+  std::string name;           ///< thickness | plane | steps
+  std::string change;         ///< what was made finer, in words
+  std::string failure;        ///< why it could not be run; empty when it was
+  double rms_px = 0;          ///< by which predictions moved, over all observations
+  double seconds = 0;         ///< that it took
+  std::vector<double> shift;  ///< [parameters] of the transformed parameters; empty when it was not run
 };
 
 struct FitIteration {
@@ -76,6 +87,7 @@ struct FitResult {
   int forward_runs = 0, jacobian_runs = 0;
   double seconds = 0, forward_seconds = 0;  ///< whole fit; median forward run
   std::vector<FitIteration> history;
+  std::vector<DiscretisationShift> discretisation;  ///< empty when it was not asked for
   VectorXd singular_values;              ///< of the whitened Jacobian by transformed parameters, descending
   MatrixXd right_vectors;                ///< [parameters][parameters] columns belong to singular_values
   MatrixXd correlation;                  ///< [parameters][parameters] of the covariance that sigma is from

@@ -280,4 +280,34 @@ std::string interval_note(const JointProblem& problem, const NoiseCheck& noise,
          which_are_wider(found, problem.variables()) + ").";
 }
 
+void add_discretisation_notes(FitResult& result) {
+  if (result.discretisation.empty()) {
+    result.notes.push_back(
+        "What the discretisation does to the answer was not checked (/fit/discretisation_check): intervals take "
+        "the elements and steps for exact.");
+    return;
+  }
+  double seconds = 0;
+  for (const DiscretisationShift& d : result.discretisation) seconds += d.seconds;
+  result.notes.push_back(
+      "Discretisation: the tracks were predicted again with each kind of step finer (" +
+      number("%.3g", seconds) +
+      " s); by what that would move a parameter, to first order, its interval is wider, 1.96 times each, in "
+      "squares.");
+  for (std::size_t k = 0; k < result.parameters.size(); ++k) {
+    const FittedParameter& p = result.parameters[k];
+    const DiscretisationShift* largest = nullptr;
+    double squares = 0;
+    for (const DiscretisationShift& d : result.discretisation) {
+      if (!d.failure.empty()) continue;
+      squares += d.shift[k] * d.shift[k];
+      if (largest == nullptr || std::fabs(d.shift[k]) > std::fabs(largest->shift[k])) largest = &d;
+    }
+    if (largest == nullptr || !(squares > 0.5 * p.sigma * p.sigma)) continue;
+    result.cannot_tell.push_back("The discretisation, not the footage, limits " + p.name +
+                                 ", most of all this: " + largest->change +
+                                 " would move it as the table says.");
+  }
+}
+
 }  // namespace rhytid::fitting

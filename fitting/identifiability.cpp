@@ -20,6 +20,8 @@ std::string format(const char* pattern, double x) {
   return text;
 }
 
+constexpr double kNormalQuantile = 1.959963984540054;  // 97.5 %
+
 /// Beyond so many degrees of freedom an expansion errs by less than 1e-7.
 constexpr double kExactStudent = 100;
 
@@ -70,10 +72,25 @@ bool Identifiability::is_open(const VectorXd& g) const {
   return null_part.size() > 0 && null_part.cwiseAbs().maxCoeff() > 1e-6 * scaled.norm();
 }
 
-double Identifiability::sigma(const VectorXd& g) const {
+void Identifiability::add_systematic(const std::vector<double>& shift) {
+  require(static_cast<Eigen::Index>(shift.size()) == scale_.size(), "Identifiability: one shift per parameter");
+  systematic_.emplace_back(Eigen::Map<const VectorXd>(shift.data(), scale_.size()));
+}
+
+double Identifiability::noise_sigma(const VectorXd& g) const {
   if (is_open(g)) return kInfinity;
   const VectorXd along = directions_.transpose() * (basis_.transpose() * g);
   return std::sqrt(along.cwiseAbs2().dot(variances_));
+}
+
+double Identifiability::systematic(const VectorXd& g) const {
+  double squares = 0;
+  for (const VectorXd& shift : systematic_) squares += std::pow(g.dot(shift), 2);
+  return std::sqrt(squares);
+}
+
+double Identifiability::sigma(const VectorXd& g) const {
+  return std::hypot(noise_sigma(g), systematic(g));
 }
 
 double Identifiability::sigma(int parameter) const {
@@ -94,7 +111,7 @@ double Identifiability::degrees(const VectorXd& g) const {
 }
 
 double Identifiability::half_width(const VectorXd& g) const {
-  return student_quantile_975(degrees(g)) * sigma(g);
+  return std::hypot(student_quantile_975(degrees(g)) * noise_sigma(g), kNormalQuantile * systematic(g));
 }
 
 double Identifiability::half_width(int parameter) const {
@@ -103,13 +120,14 @@ double Identifiability::half_width(int parameter) const {
 
 double Identifiability::widened_by_misfit(int parameter) const {
   const VectorXd g = VectorXd::Unit(scale_.size(), parameter);
-  return is_open(g) ? 1 : sigma(g) / (widening_ * (basis_.transpose() * g).norm());
+  return is_open(g) ? 1 : noise_sigma(g) / (widening_ * (basis_.transpose() * g).norm());
 }
 
 MatrixXd Identifiability::correlation() const {
   const Eigen::Index n = scale_.size();
   const MatrixXd root = basis_ * directions_ * variances_.cwiseSqrt().asDiagonal();
-  const MatrixXd covariance = root * root.transpose();
+  MatrixXd covariance = root * root.transpose();
+  for (const VectorXd& shift : systematic_) covariance += shift * shift.transpose();
   MatrixXd result = MatrixXd::Identity(n, n);
   for (Eigen::Index a = 0; a < n; ++a)
     for (Eigen::Index b = 0; b < n; ++b) {
@@ -123,7 +141,8 @@ MatrixXd Identifiability::correlation() const {
 
 double Identifiability::deviation_along(int i) const {
   const VectorXd along = directions_.row(i).transpose();
-  return std::sqrt(along.cwiseAbs2().dot(variances_)) / singular_values_[i];
+  return std::hypot(std::sqrt(along.cwiseAbs2().dot(variances_)) / singular_values_[i],
+                    systematic(right_vectors_.col(i).cwiseQuotient(scale_)));
 }
 
 bool Identifiability::determined(int parameter) const {
@@ -161,7 +180,7 @@ std::vector<std::string> Identifiability::cannot_tell() const {
 double student_quantile_975(double degrees_of_freedom) {
   const double v = std::max(1.0, degrees_of_freedom);
   if (v > kExactStudent) {
-    const double z = 1.959963984540054, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
+    const double z = kNormalQuantile, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
     return z + (z3 + z) / (4 * v) + (5 * z5 + 16 * z3 + 3 * z) / (96 * v * v) +
            (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * v * v * v);
   }

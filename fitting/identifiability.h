@@ -9,8 +9,11 @@
 //
 //   Cov(t) = P U max(w², Λ) Uᵀ Pᵀ
 //
+// A systematic shift δ that is known only in size (discretisation.h) adds δ δᵀ, as if it were one standard
+// deviation of a normal law.
+//
 // One matrix gives deviations, correlations and intervals. An interval has the degrees of freedom of the two
-// parts of its variance together (Welch and Satterthwaite).
+// parts of its variance together (Welch and Satterthwaite); shifts add 1.96 |gᵀδ| each, in squares.
 //
 // Columns of parameters without a transform are scaled by their range, so that one unit means "a factor e"
 // for log parameters and "the whole range" for plain ones.
@@ -35,6 +38,9 @@ class Identifiability {
   Identifiability(const MatrixXd& jacobian, const std::vector<FitVariable>& variables, double widening,
                   int degrees_of_freedom, const std::vector<WhitenedTrack>& tracks = {});
 
+  /// Adds a shift [parameters] of t that the data cannot show.
+  void add_systematic(const std::vector<double>& shift);
+
   const VectorXd& singular_values() const { return singular_values_; }  ///< of scaled J, descending
   const MatrixXd& right_vectors() const { return right_vectors_; }      ///< columns, scaled parameters
   int rank() const { return rank_; }
@@ -43,12 +49,15 @@ class Identifiability {
   /// Standard deviation of gᵀt (g by t); infinite when g has a part in the null space.
   double sigma(const VectorXd& g) const;
   double sigma(int parameter) const;
-  /// Degrees of freedom of sigma(g)²; one when g has a part in the null space.
+  /// The part of it that comes from noise and misfit.
+  double noise_sigma(const VectorXd& g) const;
+  /// Degrees of freedom of noise_sigma(g)²; one when g has a part in the null space.
   double degrees(const VectorXd& g) const;
-  /// Half of the 95 % interval of gᵀt: Student's quantile times sigma; infinite as sigma is.
+  /// Half of the 95 % interval of gᵀt: Student's quantile times noise_sigma, and 1.96 times each shift;
+  /// infinite as sigma is.
   double half_width(const VectorXd& g) const;
   double half_width(int parameter) const;
-  /// How many times larger the misfit makes a parameter's standard deviation than the noise; 1 = not at all.
+  /// How many times larger the misfit makes a parameter's noise_sigma than the noise; 1 = not at all.
   double widened_by_misfit(int parameter) const;
   /// Of t, from the same covariance as sigma; pairs with an undetermined member are NaN (1 on the diagonal).
   MatrixXd correlation() const;
@@ -61,6 +70,7 @@ class Identifiability {
   std::string direction_in_words(int i) const;
   /// Standard deviation along right vector i < rank() of the scaled parameters.
   double deviation_along(int i) const;
+  double systematic(const VectorXd& g) const;  ///< root of the sum of squares of the shifts of gᵀt
   bool is_open(const VectorXd& g) const;  ///< has a part in the null space
 
   std::vector<FitVariable> variables_;
@@ -69,6 +79,7 @@ class Identifiability {
   SpatialMisfit misfit_;
   MatrixXd directions_;  ///< U [rank][rank]
   VectorXd variances_;   ///< max(w², λ)
+  std::vector<VectorXd> systematic_;
   double widening_;
   int degrees_of_freedom_, rank_ = 0;
 };

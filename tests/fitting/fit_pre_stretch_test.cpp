@@ -17,6 +17,7 @@ FitInput make_input(double start) {
   const Scene scene = test::drag_scene(4, {"/skin/pre_stretch={\"stretch\": 1.1}", "/skin/rim=sliding"});
   const Camera camera = test::make_camera();
   FitCase fit;
+  fit.discretisation_check = false;
   fit.min_sigma = 0.005;
   fit.parameters = {test::fitted(kStretch, start),
                     test::fitted("/colliders/finger/friction/coefficient", 0.5)};

@@ -88,6 +88,27 @@ TEST(Identifiability, OneCovarianceOfNoiseAndMisfit) {
   }
 }
 
+// Shifts that no residual shows: added to the covariance, in intervals with the quantile of a normal law.
+TEST(Identifiability, SystematicShiftsAddToTheCovariance) {
+  const MatrixXd j = random_matrix(50, 3, 10);
+  const MatrixXd covariance = (j.transpose() * j).inverse();
+  Identifiability found(j, log_variables({"a", "b", "c"}), 1.5, 47);
+  const double half = found.half_width(0);
+  const Vec3 one(0.3, -0.1, 0), other(0, 0.2, 0.05);
+  found.add_systematic({one.begin(), one.end()});
+  found.add_systematic({other.begin(), other.end()});
+  const Mat3 all = 2.25 * covariance + one * one.transpose() + other * other.transpose();
+  const Vec3 g(0.5, 2, -1);
+  EXPECT_NEAR(found.sigma(g), std::sqrt(g.dot(all * g)), 1e-12);
+  EXPECT_NEAR(found.noise_sigma(g), 1.5 * std::sqrt(g.dot(covariance * g)), 1e-12);
+  EXPECT_NEAR(found.correlation()(0, 1), all(0, 1) / std::sqrt(all(0, 0) * all(1, 1)), 1e-12);
+  EXPECT_NEAR(found.half_width(0), std::hypot(half, 1.959963984540054 * 0.3), 1e-12);
+  EXPECT_NEAR(found.widened_by_misfit(1), 1, 1e-12) << "that is another matter";
+  found.add_systematic({2, 0, 0});
+  EXPECT_FALSE(found.determined(0)) << "a factor e and more";
+  EXPECT_TRUE(found.determined(2));
+}
+
 TEST(Identifiability, NamesAnExactTradeOffAndKeepsTheRatio) {
   MatrixXd j = random_matrix(50, 3, 10);
   j.col(1) = -j.col(0);  // a and b scaled together change nothing

@@ -86,6 +86,7 @@ inline FitParameter fitted(const std::string& address, std::optional<double> ini
 inline FitCase three_parameters() {
   FitCase fit;
   fit.min_sigma = 0.005;
+  fit.discretisation_check = false;
   fit.parameters = {fitted("/ligaments/sources/right/strength", 1.5),
                     fitted("/skin/layers/film/youngs_modulus", 0.5),
                     fitted("/colliders/finger/friction/coefficient", 0.6)};
