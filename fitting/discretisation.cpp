@@ -47,12 +47,13 @@ FinerScene finer_thickness(const Scene& scene) {
 FinerScene finer_plane(const Scene& scene) {
   FinerScene finer{"plane", {}, scene};
   SkinScene& skin = finer.scene.skin;
-  const int thickness_points = skin.rule == RuleKind::product && skin.prism_degree == 0 ? skin.thickness_points : 0;
+  const int thickness_points =
+      skin.rule == RuleKind::product && skin.prism_degree == 0 ? skin.thickness_points : 0;
   accurate_rule(skin);
   skin.thickness_points = thickness_points;
   skin.order += skin.order < kHighestOrder ? 1 : -1;
-  finer.change = "order " + std::to_string(skin.order) + " in the plane instead of " +
-                 std::to_string(scene.skin.order);
+  finer.change =
+      "order " + std::to_string(skin.order) + " in the plane instead of " + std::to_string(scene.skin.order);
   return finer;
 }
 
@@ -67,7 +68,8 @@ FinerScene finer_steps(const Scene& scene) {
 /// Whitened change of the residuals of one clip, rows as in its linearisation; tracks that only one of both
 /// could attach stay as they are.
 void add_change(const FitProblem& clip, const FitEvaluation& at, const FitProblem& finer,
-                const FitEvaluation& finer_at, Eigen::Index row, VectorXd& change, double& squares, int& count) {
+                const FitEvaluation& finer_at, Eigen::Index row, VectorXd& change, double& squares,
+                int& count) {
   std::map<std::pair<int, int>, std::size_t> of_finer;  // camera and track
   for (std::size_t i = 0; i < finer.compared().size(); ++i)
     of_finer[{finer.compared()[i].camera, finer.compared()[i].track}] = i;
@@ -99,8 +101,7 @@ std::vector<FinerFit> finer_fits(const JointFitInput& input) {
     for (std::size_t r = 0; r < variants.size(); ++r) {
       if (c == 0) {
         fits.push_back({variants[r].name, variants[r].change, input});
-        if (!input.evaluations.empty())
-          fits.back().input.evaluations += "/finer_" + variants[r].name;
+        if (!input.evaluations.empty()) fits.back().input.evaluations += "/finer_" + variants[r].name;
       }
       fits[r].input.clips[c].scene = variants[r].scene;
     }
@@ -141,8 +142,8 @@ std::vector<DiscretisationShift> discretisation_shifts(const JointFitInput& inpu
       Eigen::Index row = 0;
       for (int c = 0; c < problem.num_clips(); ++c) {
         const VectorXd own = problem.of_clip(c, t);
-        add_change(problem.clip(c), problem.clip(c).evaluate(own), finer.clip(c), finer.clip(c).evaluate(own), row,
-                   change, squares, count);
+        add_change(problem.clip(c), problem.clip(c).evaluate(own), finer.clip(c), finer.clip(c).evaluate(own),
+                   row, change, squares, count);
         row += problem.clip(c).num_residuals();
       }
       const VectorXd shift = -basis * (basis.transpose() * (linearised.jacobian.transpose() * change));

@@ -66,8 +66,7 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Vect
   Identifiability found(linearised->jacobian, problem.variables(), noise.widening,
                         problem.degrees_of_freedom(), whitened_tracks(problem, *linearised));
   if (input.options.discretisation_check) {
-    result.discretisation =
-        discretisation_shifts(input, problem, t, *linearised, found.basis(), observer);
+    result.discretisation = discretisation_shifts(input, problem, t, *linearised, found.basis(), observer);
     for (const DiscretisationShift& d : result.discretisation)
       if (d.failure.empty()) found.add_systematic(d.shift);
     if (result.discretisation.empty()) stop_here();

@@ -15,7 +15,8 @@ class FitLogs {
   /// one of each clip's name in there for several. `note` (may be empty) hears in one line each what became
   /// of older ones. The problem must not be evaluated once these are gone. Throws InputError when a folder
   /// cannot be made.
-  FitLogs(const JointFitInput& input, JointProblem& problem, const std::function<void(const std::string&)>& note);
+  FitLogs(const JointFitInput& input, JointProblem& problem,
+          const std::function<void(const std::string&)>& note);
   FitLogs(const FitLogs&) = delete;
   FitLogs& operator=(const FitLogs&) = delete;
 

@@ -283,7 +283,8 @@ std::string interval_note(const JointProblem& problem, const NoiseCheck& noise,
 void add_discretisation_notes(FitResult& result) {
   if (result.discretisation.empty()) {
     result.notes.push_back(
-        "What the discretisation does to the answer was not checked (/fit/discretisation_check): intervals take "
+        "What the discretisation does to the answer was not checked (/fit/discretisation_check): intervals "
+        "take "
         "the elements and steps for exact.");
     return;
   }

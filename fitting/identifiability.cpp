@@ -73,7 +73,8 @@ bool Identifiability::is_open(const VectorXd& g) const {
 }
 
 void Identifiability::add_systematic(const std::vector<double>& shift) {
-  require(static_cast<Eigen::Index>(shift.size()) == scale_.size(), "Identifiability: one shift per parameter");
+  require(static_cast<Eigen::Index>(shift.size()) == scale_.size(),
+          "Identifiability: one shift per parameter");
   systematic_.emplace_back(Eigen::Map<const VectorXd>(shift.data(), scale_.size()));
 }
 

@@ -71,7 +71,7 @@ class Identifiability {
   /// Standard deviation along right vector i < rank() of the scaled parameters.
   double deviation_along(int i) const;
   double systematic(const VectorXd& g) const;  ///< root of the sum of squares of the shifts of gᵀt
-  bool is_open(const VectorXd& g) const;  ///< has a part in the null space
+  bool is_open(const VectorXd& g) const;       ///< has a part in the null space
 
   std::vector<FitVariable> variables_;
   VectorXd scale_, singular_values_;

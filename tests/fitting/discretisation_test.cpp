@@ -29,8 +29,11 @@ FitInput make_input(const std::vector<std::string>& settings, const std::vector<
   fit.min_sigma = 0.005;
   fit.parameters = {test::fitted("/skin/layers/film/youngs_modulus", 0.9),
                     test::fitted("/colliders/finger/friction/coefficient", 0.75)};
-  return {test::drag_scene(kFrames, settings), camera,
-          test::make_tracks(test::drag_scene(kFrames, all), camera, 3, 0.02, 7), fit, {}};
+  return {test::drag_scene(kFrames, settings),
+          camera,
+          test::make_tracks(test::drag_scene(kFrames, all), camera, 3, 0.02, 7),
+          fit,
+          {}};
 }
 
 VectorXd transformed(const FitResult& result) {
@@ -53,8 +56,9 @@ TEST(FinerScenes, ChangeOneThingEach) {
   EXPECT_EQ(finer[2].scene.skin.order, 3);
   EXPECT_THAT(finer[1].change, HasSubstr("order 4"));
 
-  const Scene published = test::drag_scene(
-      2, {"/skin/order=4", R"(/skin/scheme="composite")", "/skin/composite_order=2", R"(/skin/quadrature/rule="sheet")"});
+  const Scene published =
+      test::drag_scene(2, {"/skin/order=4", R"(/skin/scheme="composite")", "/skin/composite_order=2",
+                           R"(/skin/quadrature/rule="sheet")"});
   const std::vector<FinerScene> of_published = finer_scenes(published);
   EXPECT_EQ(of_published[0].scene.skin.scheme, ThicknessScheme::stacked);
   EXPECT_EQ(of_published[0].scene.skin.rule, RuleKind::product);
@@ -63,7 +67,8 @@ TEST(FinerScenes, ChangeOneThingEach) {
 }
 
 TEST(Discretisation, ShiftsAreWhatFinerFitsFind) {
-  FitInput input = make_input({R"(/skin/scheme="composite")", "/skin/composite_order=2", "/skin/order=2"}, {});
+  FitInput input =
+      make_input({R"(/skin/scheme="composite")", "/skin/composite_order=2", "/skin/order=2"}, {});
   const FitResult coarse = run_fit(input);
   std::printf("%s", answer_text(coarse).c_str());
   ASSERT_TRUE(coarse.converged);
@@ -104,7 +109,9 @@ TEST(Discretisation, RunsAreKeptAndAStopIsAStop) {
   int polls = 0;
   bool is_checking = false;
   FitObserver observer;
-  observer.note = [&](const std::string& text) { is_checking = is_checking || text.starts_with("discretisation"); };
+  observer.note = [&](const std::string& text) {
+    is_checking = is_checking || text.starts_with("discretisation");
+  };
   observer.should_stop = [&] { return is_checking && ++polls > 3; };
   const FitResult stopped = run_fit(input, observer);
   EXPECT_TRUE(stopped.stopped);
