@@ -94,9 +94,10 @@ std::string shift_table(const FitResult& result) {
     Row row = {p.name, is_log ? "%" : p.transform == "none" ? p.unit : "logit"};
     for (const DiscretisationShift& d : result.discretisation)
       if (d.failure.empty()) {
-        char moved[32];
-        std::snprintf(moved, sizeof(moved), is_log ? "%+.1f" : "%+.3g",
-                      is_log ? 100 * std::expm1(d.shift[k]) : d.shift[k]);
+        char moved[32] = "-";  // of what is not determined there is nothing to move
+        const double value = is_log ? 100 * std::expm1(d.shift[k]) : d.shift[k];
+        if (p.determined || std::fabs(d.shift[k]) < 1)
+          std::snprintf(moved, sizeof(moved), is_log ? "%+.1f" : "%+.3g", value);
         row.push_back(moved);
       }
     rows.push_back(std::move(row));

@@ -288,13 +288,10 @@ void add_discretisation_notes(FitResult& result) {
         "the elements and steps for exact.");
     return;
   }
-  double seconds = 0;
-  for (const DiscretisationShift& d : result.discretisation) seconds += d.seconds;
   result.notes.push_back(
-      "Discretisation: the tracks were predicted again with each kind of step finer (" +
-      number("%.3g", seconds) +
-      " s); by what that would move a parameter, to first order, its interval is wider, 1.96 times each, in "
-      "squares.");
+      "Discretisation: the tracks were predicted again with each kind of step finer; by what that would move "
+      "a "
+      "parameter, to first order, its interval is wider, 1.96 times each, in squares.");
   for (std::size_t k = 0; k < result.parameters.size(); ++k) {
     const FittedParameter& p = result.parameters[k];
     const DiscretisationShift* largest = nullptr;

@@ -14,15 +14,13 @@
 #include <optional>
 #include <set>
 
+#include "fitting/pose.h"
 #include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
 
 namespace rhytid::fitting {
 namespace {
-
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kDegrees = 57.29577951308232;
 
@@ -61,94 +59,15 @@ Number number_of(const std::string& where, const std::string& name, const std::s
 
 // --- the pose
 
-/// A rotation and a translation, world to camera.
-struct Pose {
-  Mat3 rotation;
-  Vec3 translation;
-};
-
-Camera at(const Camera& camera, const Pose& pose) {
-  Camera moved = camera;
-  moved.rotation = pose.rotation;
-  moved.translation = pose.translation;
-  return moved;
-}
-
-Mat3 rotation_of(const Vec3& w) {
-  const double angle = w.norm();
-  return angle > 0 ? Eigen::AngleAxisd(angle, w / angle).toRotationMatrix() : Mat3::Identity();
-}
-
-Vec3 centroid(const std::vector<Landmark>& landmarks) {
-  Vec3 sum = Vec3::Zero();
-  for (const Landmark& l : landmarks) sum += l.point;
-  return sum / static_cast<double>(landmarks.size());
-}
-
-/// χ² and its normal equations by (ω, τ) about the centroid m.
-struct Linearised {
-  double chi_square = 0;  ///< infinite when a landmark is behind the camera
-  Matrix6d hessian = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-};
-
-Linearised linearise(const std::vector<Landmark>& landmarks, const Camera& camera, const Pose& pose) {
-  const Camera moved = at(camera, pose);
-  const Vec3 m = pose.rotation * centroid(landmarks) + pose.translation;
-  Linearised l;
-  for (const Landmark& landmark : landmarks) {
-    const Vec2 r = landmark.pixel - moved.project(landmark.point);
-    if (!r.allFinite()) {
-      l.chi_square = std::numeric_limits<double>::infinity();
-      return l;
-    }
-    const Vec3 arm = pose.rotation * landmark.point + pose.translation - m;
-    // By the point in the camera's frame; that of exp(ω) arm at ω = 0 is −[arm]×.
-    const Eigen::Matrix<double, 2, 3> by_point =
-        moved.projection_jacobian(landmark.point) * pose.rotation.transpose();
-    Mat3 cross;
-    cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
-    Eigen::Matrix<double, 2, 6> jacobian;
-    jacobian << -by_point * cross, by_point;
-    const double weight = 1 / (landmark.sigma * landmark.sigma);
-    l.chi_square += weight * r.squaredNorm();
-    l.hessian += weight * jacobian.transpose() * jacobian;
-    l.gradient += weight * jacobian.transpose() * r;
-  }
-  return l;
-}
-
-Pose moved(const std::vector<Landmark>& landmarks, const Pose& pose, const Vector6d& step) {
-  const Mat3 turn = rotation_of(step.head<3>());
-  const Vec3 m = pose.rotation * centroid(landmarks) + pose.translation;
-  return {turn * pose.rotation, turn * (pose.translation - m) + m + step.tail<3>()};
-}
-
-/// Levenberg's damping on Gauss-Newton, to rounding.
-Pose refine(const std::vector<Landmark>& landmarks, const Camera& camera, Pose pose) {
-  Linearised here = linearise(landmarks, camera, pose);
-  double damping = 1e-6;
-  for (int iteration = 0; iteration < 100 && std::isfinite(here.chi_square) && damping < 1e12; ++iteration) {
-    Matrix6d damped = here.hessian;
-    damped.diagonal() *= 1 + damping;
-    const Vector6d step = damped.ldlt().solve(here.gradient);
-    const Pose next = moved(landmarks, pose, step);
-    const Linearised there = linearise(landmarks, camera, next);
-    if (!(there.chi_square <= here.chi_square)) {
-      damping *= 10;
-      continue;
-    }
-    const bool is_done = here.chi_square - there.chi_square <= 1e-14 * here.chi_square;
-    pose = next;
-    here = there;
-    damping = std::max(1e-12, damping / 10);
-    if (is_done) break;
-  }
-  return pose;
+std::vector<SightedPoint> sighted(const std::vector<Landmark>& landmarks) {
+  std::vector<SightedPoint> points;
+  for (const Landmark& l : landmarks)
+    points.push_back({l.pixel, l.point, Eigen::Matrix2d::Identity() / (l.sigma * l.sigma)});
+  return points;
 }
 
 /// SQPnP; nothing when it finds no pose.
-std::optional<Pose> first_pose(const std::vector<Landmark>& landmarks, const Camera& camera) {
+std::optional<Camera> first_pose(const std::vector<Landmark>& landmarks, const Camera& camera) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> pixels;
   for (const Landmark& l : landmarks) {
@@ -168,42 +87,49 @@ std::optional<Pose> first_pose(const std::vector<Landmark>& landmarks, const Cam
   const Vec3 w(turn.at<double>(0), turn.at<double>(1), turn.at<double>(2));
   const Vec3 t(shift.at<double>(0), shift.at<double>(1), shift.at<double>(2));
   if (!w.allFinite() || !t.allFinite()) return std::nullopt;
-  return Pose{rotation_of(w), t};
+  Camera found = camera;
+  found.rotation =
+      w.norm() > 0 ? Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix() : Mat3::Identity();
+  found.translation = t;
+  return found;
 }
 
 /// Principal axes of the landmarks, longest first, and their rms extents.
 Eigen::JacobiSVD<Eigen::MatrixXd> principal_axes(const std::vector<Landmark>& landmarks) {
   Eigen::MatrixXd points(static_cast<Eigen::Index>(landmarks.size()), 3);
-  const Vec3 middle = centroid(landmarks);
+  const Vec3 middle = centroid(sighted(landmarks));
   for (Eigen::Index i = 0; i < points.rows(); ++i)
     points.row(i) = (landmarks[static_cast<std::size_t>(i)].point - middle).transpose();
   return Eigen::JacobiSVD<Eigen::MatrixXd>(points, Eigen::ComputeThinV);
 }
 
 /// The pose that flat landmarks nearly allow as well: their normal mirrored about the line of sight.
-Pose mirrored(const std::vector<Landmark>& landmarks, const Pose& pose) {
+Camera mirrored(const std::vector<Landmark>& landmarks, const Camera& pose) {
   const Vec3 normal = pose.rotation * principal_axes(landmarks).matrixV().col(2);
-  const Vec3 m = pose.rotation * centroid(landmarks) + pose.translation, sight = m.normalized();
+  const Vec3 m = pose.rotation * centroid(sighted(landmarks)) + pose.translation, sight = m.normalized();
   const Vec3 other = 2 * normal.dot(sight) * sight - normal;
   const Mat3 turn = Eigen::Quaterniond::FromTwoVectors(normal, other).toRotationMatrix();
-  return {turn * pose.rotation, turn * (pose.translation - m) + m};
+  Camera other_side = pose;
+  other_side.rotation = turn * pose.rotation;
+  other_side.translation = turn * (pose.translation - m) + m;
+  return other_side;
 }
 
 /// The better of the two minima, and how much worse the other one's χ² is.
 struct Minima {
-  Pose best;
+  Camera best;
   double chi_square = 0;
   double second = std::numeric_limits<double>::infinity();  ///< χ² of the other
   double angle = 0;                                         ///< rad between the two
 };
 
 std::optional<Minima> minima(const std::vector<Landmark>& landmarks, const Camera& camera) {
-  const std::optional<Pose> start = first_pose(landmarks, camera);
+  const std::optional<Camera> start = first_pose(landmarks, camera);
   if (!start) return std::nullopt;
-  Pose one = refine(landmarks, camera, *start);
-  Pose two = refine(landmarks, camera, mirrored(landmarks, one));
-  double first = linearise(landmarks, camera, one).chi_square,
-         second = linearise(landmarks, camera, two).chi_square;
+  const std::vector<SightedPoint> points = sighted(landmarks);
+  Camera one = refine_pose(points, *start);
+  Camera two = refine_pose(points, mirrored(landmarks, one));
+  double first = pose_normal(points, one).chi_square, second = pose_normal(points, two).chi_square;
   if (second < first) {
     std::swap(one, two);
     std::swap(first, second);
@@ -215,19 +141,19 @@ std::optional<Minima> minima(const std::vector<Landmark>& landmarks, const Camer
 
 /// Every landmark's distance from where the others put it, px.
 std::vector<double> leave_one_out(const std::vector<Landmark>& landmarks, const Camera& camera,
-                                  const Pose& pose, std::vector<double>& scale_without) {
+                                  const Camera& pose, std::vector<double>& scale_without) {
   std::vector<double> distances;
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     std::vector<Landmark> others = landmarks;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
     // Where one landmark is far off, the pose of all is no start for the others.
-    Pose best = refine(others, camera, pose);
-    double chi_square = linearise(others, camera, best).chi_square;
+    Camera best = refine_pose(sighted(others), pose);
+    double chi_square = pose_normal(sighted(others), best).chi_square;
     if (const std::optional<Minima> found = minima(others, camera); found && found->chi_square < chi_square) {
       best = found->best;
       chi_square = found->chi_square;
     }
-    distances.push_back((landmarks[i].pixel - at(camera, best).project(landmarks[i].point)).norm());
+    distances.push_back((landmarks[i].pixel - best.project(landmarks[i].point)).norm());
     const double freedom = 2.0 * static_cast<double>(others.size()) - 6;
     scale_without.push_back(std::sqrt(chi_square / freedom));
   }
@@ -296,7 +222,7 @@ PoseEstimate estimate_pose(const std::vector<Landmark>& landmarks, const Camera&
                      "pixels x, y and vertices that belong together");
 
   PoseEstimate estimate;
-  estimate.camera = at(camera, found->best);
+  estimate.camera = found->best;
   for (const Landmark& l : landmarks) {
     estimate.residuals.push_back(l.pixel - estimate.camera.project(l.point));
     estimate.rms += estimate.residuals.back().squaredNorm();
@@ -305,10 +231,11 @@ PoseEstimate estimate_pose(const std::vector<Landmark>& landmarks, const Camera&
   const double freedom = 2.0 * static_cast<double>(n) - 6;
   estimate.reduced_chi_square = found->chi_square / freedom;
 
-  const Linearised l = linearise(landmarks, camera, found->best);
+  const PoseNormal l = pose_normal(sighted(landmarks), found->best);
   estimate.covariance =
       std::max(1.0, estimate.reduced_chi_square) * l.hessian.ldlt().solve(Matrix6d::Identity());
-  const Vec3 sight = (found->best.rotation * centroid(landmarks) + found->best.translation).normalized();
+  const Vec3 sight =
+      (found->best.rotation * centroid(sighted(landmarks)) + found->best.translation).normalized();
   const auto parts = [&](const Mat3& covariance, double& across, double& along) {
     const double along_variance = sight.dot(covariance * sight);
     along = std::sqrt(along_variance);

@@ -68,7 +68,7 @@ TEST(FinerScenes, ChangeOneThingEach) {
 
 TEST(Discretisation, ShiftsAreWhatFinerFitsFind) {
   FitInput input =
-      make_input({R"(/skin/scheme="composite")", "/skin/composite_order=2", "/skin/order=2"}, {});
+      make_input({R"(/skin/scheme="composite")", "/skin/composite_order=3", "/skin/order=3"}, {});
   const FitResult coarse = run_fit(input);
   std::printf("%s", answer_text(coarse).c_str());
   ASSERT_TRUE(coarse.converged);
@@ -81,6 +81,7 @@ TEST(Discretisation, ShiftsAreWhatFinerFitsFind) {
     FitInput again = input;
     again.scene = finer[r].scene;
     again.options.discretisation_check = false;
+    for (std::size_t k = 0; k < 2; ++k) again.options.parameters[k].initial = coarse.parameters[k].value;
     const FitResult fitted = run_fit(again);
     const VectorXd moved = transformed(fitted) - transformed(coarse);
     const Eigen::Map<const VectorXd> shift(predicted.shift.data(), 2);

@@ -41,6 +41,8 @@ FitResult example() {
   r.gauge = "held";
   r.initial_cost = 1e5 / 7;
   r.num_observations = 12345;
+  r.discretisation = {{"plane", "order 4", "", 0.25, 1.5, {0.1, -1. / 3}},
+                      {"steps", "finer", "no end", 0, 2, {}}};
   r.history = {{0, 1, 10, 1, 0, 0.5, {1, 2}}, {1, 3, 1. / 7, 1e-3, 0.2, 1.5, {1.1, nan_value}}};
   r.singular_values = VectorXd::LinSpaced(2, 3.3, 0.1);
   r.right_vectors = MatrixXd::Identity(2, 2);
@@ -81,6 +83,11 @@ TEST(FitResult, ReadsBackBitForBit) {
   EXPECT_TRUE(std::isnan(*s.derived[1].truth));
   EXPECT_EQ(s.initial_cost, r.initial_cost);
   EXPECT_EQ(s.num_observations, 12345);
+  ASSERT_EQ(s.discretisation.size(), 2u);
+  EXPECT_EQ(s.discretisation[0].shift, r.discretisation[0].shift);
+  EXPECT_EQ(s.discretisation[0].change, "order 4");
+  EXPECT_EQ(s.discretisation[1].failure, "no end");
+  EXPECT_TRUE(s.discretisation[1].shift.empty());
   EXPECT_EQ(s.history[1].cost, 1. / 7);
   EXPECT_TRUE(std::isnan(s.history[1].values[1]));
   EXPECT_EQ(s.singular_values, r.singular_values);

@@ -31,6 +31,9 @@ void add_convergence(HtmlPage& page, const ReportData& data);
 /// Singular values, correlations, the weakest combination.
 void add_identifiability(HtmlPage& page, const ReportData& data);
 
+/// What finer elements and steps would do to the answer, where the fit looked.
+void add_discretisation(HtmlPage& page, const ReportData& data);
+
 /// The checks of certificate.json, where the folder has one.
 void add_certificate(HtmlPage& page, ReportData& data);
 

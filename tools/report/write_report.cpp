@@ -73,6 +73,7 @@ ReportOutcome write_report(const std::string& folder, Progress& progress, const 
   if (late) add_surface(page, data, late->displacement, late->frame);
   add_convergence(page, data);
   add_identifiability(page, data);
+  add_discretisation(page, data);
   add_certificate(page, data);
   add_run_facts(page, data);
   write_file(outcome.path, page.finish());
