@@ -44,6 +44,11 @@ FitCase read_fit(const json& j) {
   c.first_frame = j["first_frame"], c.last_frame = j["last_frame"];
   c.rim_margin = j["rim_margin"], c.gauge_layer = j["gauge_layer"];
   c.discretisation_check = j["discretisation_check"];
+  for (const json& region : j.value("still", json::array())) {
+    StillRegion r{region["name"]};
+    for (int a = 0; a < 3; ++a) r.low[a] = region["box"]["low"][a], r.high[a] = region["box"]["high"][a];
+    c.still.push_back(std::move(r));
+  }
   return c;
 }
 
@@ -282,6 +287,12 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
     throw InputError(located.where("/track/window") + ": /track/window", std::to_string(c.track.window),
                      "an odd number of px, so that the window has a middle");
   c.fit = read_fit(root["fit"]);
+  for (std::size_t i = 0; i < c.fit.still.size(); ++i)
+    if (!(c.fit.still[i].low.array() < c.fit.still[i].high.array()).all()) {
+      const std::string pointer = "/fit/still/" + std::to_string(i) + "/box";
+      throw InputError(located.where(pointer) + ": " + pointer,
+                       shown_json(located.json["fit"]["still"][i]["box"]), "low below high in x, y and z");
+    }
   if (c.fit.last_frame != 0 && c.fit.last_frame < c.fit.first_frame)
     throw InputError(located.where("/fit/last_frame") + ": /fit/last_frame", std::to_string(c.fit.last_frame),
                      "0 (all frames) or at least first_frame, " + std::to_string(c.fit.first_frame));

@@ -24,6 +24,7 @@
 #include <utility>
 #include <vector>
 
+#include "fitting/head_motion.h"
 #include "sim/scene/located_json.h"
 #include "sim/scene/parameter.h"
 
@@ -67,6 +68,8 @@ struct FitCase {
   double min_sigma = 0.05;  ///< px, floor of the standard deviation of a displacement since frame 0, per axis
   int first_frame = 1, last_frame = 0;  ///< frames used, 0 = all
   double rim_margin = 1;                ///< mm: tracks closer to the rim of the patch are left out
+  /// Where tracked points stand still on the head: its motion is taken out by them. Empty: it stands still.
+  std::vector<StillRegion> still;
   /// Whether what the discretisation does to the answer is estimated, and enters the intervals.
   bool discretisation_check = true;
   /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden

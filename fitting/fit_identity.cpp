@@ -59,6 +59,10 @@ std::string parameters_digest(const FitCase& fit, const Parametrisation& paramet
   for (const double x : {fit.robust_scale, fit.min_sigma, static_cast<double>(fit.first_frame),
                          static_cast<double>(fit.last_frame), fit.rim_margin})
     d.number(x);
+  for (const StillRegion& region : fit.still) {
+    d.matrix(region.low);
+    d.matrix(region.high);
+  }
   return d.hex();
 }
 

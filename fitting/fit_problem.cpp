@@ -53,6 +53,12 @@ void add(const RegistrationReport& one, RegistrationReport& all) {
   all.not_refined += one.not_refined;
 }
 
+std::vector<adjoint::MaterialPoint> points_of(const Registration& found) {
+  std::vector<adjoint::MaterialPoint> points;
+  for (const RegisteredTrack& r : found.tracks) points.push_back(r.point);
+  return points;
+}
+
 /// The surface that frame 0 shows: at rest, or settled (initial parameters).
 SkinMesh first_frame_mesh(const SceneModel& model, const RunOptions& options) {
   SkinMesh mesh = model.model().mesh;
@@ -81,14 +87,10 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
   if (options_.frames < 1) throw InputError("fit: frames", "0", "a scene with at least one frame after rest");
   require_names(cameras, tracks);
   const SkinMesh seen_first = first_frame_mesh(model_, options_);
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    const Registration found = register_tracks(tracks, cameras[c], seen_first, fit.rim_margin);
-    choose_observations(tracks, fit, static_cast<int>(c), found);
-    add(found.report, registration_.report);
-  }
+  for (std::size_t c = 0; c < cameras.size(); ++c)
+    attach(scene, fit, cameras[c], static_cast<int>(c), tracks, seen_first);
   require_observations(fit, cameras);
 
-  std::vector<adjoint::MaterialPoint> points;
   std::vector<std::vector<int>> points_in_frame(options_.frames + 1);
   output_row_.resize(compared_.size());
   for (std::size_t i = 0; i < compared_.size(); ++i)
@@ -98,11 +100,12 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
     }
   if (options_.settle)  // in the order of the tracks, see first_prediction
     for (std::size_t i = 0; i < compared_.size(); ++i) points_in_frame[0].push_back(static_cast<int>(i));
-  for (const RegisteredTrack& r : registration_.tracks) points.push_back(r.point);
   std::vector<int> seen_by;
   for (const ComparedTrack& c : compared_) seen_by.push_back(c.camera);
-  prediction_.emplace(model_.model().mesh, std::move(points), cameras, std::move(seen_by),
+  prediction_.emplace(model_.model().mesh, points_of(registration_), cameras, std::move(seen_by),
                       std::move(points_in_frame));
+  for (std::size_t c = 0; c < head_motion_.size(); ++c)
+    prediction_->set_poses(static_cast<int>(c), head_motion_[c].cameras);
   for (int f = 0; f <= options_.frames; ++f) {
     frame_row_.push_back(num_predicted_);
     num_predicted_ += prediction_->size(f);
@@ -112,14 +115,43 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
   for (const FitVariable& v : parametrisation_.variables()) num_residuals_ += v.prior_sigma ? 1 : 0;
 }
 
+void FitProblem::attach(const Scene& scene, const FitCase& fit, const Camera& camera, int number,
+                        const TrackSet& tracks, const SkinMesh& seen_first) {
+  if (fit.still.empty()) {
+    const Registration found = register_tracks(tracks, camera, seen_first, fit.rim_margin);
+    choose_observations(tracks, fit, number, found, nullptr);
+    return add(found.report, registration_.report);
+  }
+  const std::vector<StillTrack> still = find_still_tracks(tracks, camera, scene.skin.surface, fit.still);
+  head_motion_.push_back(estimate_head_motion(tracks, still, camera, options_.frames,
+                                              fit.min_sigma / std::sqrt(2.), fit.robust_scale));
+  TrackSet others = tracks;  // under the same numbers
+  for (const StillTrack& s : still) others.tracks[s.track].camera.clear();
+  const Registration found = register_tracks(others, camera, seen_first, fit.rim_margin);
+  choose_observations(tracks, fit, number, found, &head_motion_.back());
+  add(found.report, registration_.report);
+}
+
 void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit, int camera,
-                                     const Registration& found) {
+                                     const Registration& found, const HeadMotion* motion) {
   const int first = std::max(1, fit.first_frame);
   const double floor =
       fit.min_sigma / std::sqrt(2.);  // of the two parts of a displacement's variance, half each
-  for (const RegisteredTrack& r : found.tracks) {
-    const Track& track = tracks.tracks[r.track];
+  const adjoint::PointInterpolation at(model_.model().mesh, points_of(found));
+  const VectorXd rest = VectorXd::Zero(3 * model_.model().mesh.num_nodes());
+  for (std::size_t k = 0; k < found.tracks.size(); ++k) {
+    const RegisteredTrack& r = found.tracks[k];
+    Track track = tracks.tracks[r.track];
     check_times(track, options_.frame_rate);
+    if (motion != nullptr) {
+      const Vec3 point = at.position(static_cast<int>(k), rest);
+      std::erase_if(track.observations, [&](const Observation& o) {
+        return o.frame > 0 && o.frame <= options_.frames && !motion->known[o.frame];
+      });
+      for (Observation& o : track.observations)
+        if (o.frame > 0 && o.frame <= options_.frames && o.status == TrackStatus::ok)
+          o.covariance += motion->pixel_covariance(o.frame, point);
+    }
     ComparedTrack compared{r.track, camera, track.at(0)->pixel, {}, {}};
     std::vector<const Observation*> used_observations;
     for (const Observation& o : track.observations) {

@@ -86,6 +86,8 @@ class FitProblem final : public Objective {
   const std::vector<Camera>& cameras() const { return prediction_->cameras(); }
   /// Rest positions of the points of compared(), mm.
   std::vector<Vec3> rest_points() const;
+  /// How the head moves before each camera; empty where it stands still.
+  const std::vector<HeadMotion>& head_motion() const { return head_motion_; }
   const std::vector<TrackNoise>& noise() const { return noise_; }
 
   struct Counters {
@@ -104,8 +106,12 @@ class FitProblem final : public Objective {
   EvaluationLog* log = nullptr;  ///< may be null; must outlive the last evaluation
 
  private:
-  /// Which observations of the registered tracks of one camera count.
-  void choose_observations(const TrackSet& tracks, const FitCase& fit, int camera, const Registration& found);
+  /// Which observations of the registered tracks of one camera count; `motion` may be null.
+  void choose_observations(const TrackSet& tracks, const FitCase& fit, int camera, const Registration& found,
+                           const HeadMotion* motion);
+  /// Attaches the tracks of one camera, still ones to the head and the others to the skin.
+  void attach(const Scene& scene, const FitCase& fit, const Camera& camera, int number,
+              const TrackSet& tracks, const SkinMesh& seen_first);
   void require_observations(const FitCase& fit, const std::vector<Camera>& cameras) const;
   void run(const VectorXd& t);
   /// Simulates at t_ and projects: predicted pixels of all frames below one another, [rows][1].
@@ -127,6 +133,7 @@ class FitProblem final : public Objective {
   SceneModel model_;
   RunOptions options_;
   Registration registration_;
+  std::vector<HeadMotion> head_motion_;
   std::vector<ComparedTrack> compared_;
   std::vector<TrackNoise> noise_;
   std::optional<ProjectedPoints> prediction_;

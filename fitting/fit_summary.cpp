@@ -47,6 +47,26 @@ void note_tracks_left_out(const FitProblem& clip, const FitCase& options, FitRes
       std::to_string(r.not_refined) + " on a silhouette.");
 }
 
+void note_head_motion(const FitProblem& clip, FitResult& result) {
+  const std::string where = clip.name.empty() ? "" : "Clip " + clip.name + ": ";
+  for (std::size_t c = 0; c < clip.head_motion().size(); ++c) {
+    const HeadMotion& m = clip.head_motion()[c];
+    const auto lost = std::count(m.known.begin(), m.known.end(), false);
+    const std::string camera = clip.cameras().size() > 1 ? " before camera " + clip.cameras()[c].name : "";
+    result.notes.push_back(
+        where + "The head turns by up to " + number("%.2g", m.largest_turn * 57.29577951308232) +
+        " degrees and moves by up to " + number("%.2g", m.largest_shift) + " mm" + camera + ", by " +
+        std::to_string(m.num_tracks) + " tracks that stand still on it (" + number("%.3g", m.rms_px) +
+        " px rms left, reduced chi-square " + number("%.3g", m.reduced_chi_square) + ")" +
+        (lost > 0 ? "; " + std::to_string(lost) + " frames show too few of them and are not compared."
+                  : "."));
+    if (m.reduced_chi_square > 4)
+      result.notes.push_back("Warning: " + where + "points of /fit/still do not stand still on the head" +
+                             camera + ": they are off by " + number("%.2g", std::sqrt(m.reduced_chi_square)) +
+                             " times their deviation.");
+  }
+}
+
 /// Residuals of one clip, its squares summed into `clip`.
 void add_clip(const TrackSet& tracks, const FitProblem& problem, const FitEvaluation& at, int number,
               FittedClip& clip, FitResult& result) {
@@ -244,7 +264,10 @@ void add_clip_chi_squares(const JointProblem& problem, const FitProblem::Lineari
 
 void add_notes(const JointFitInput& input, JointProblem& problem, const VectorXd& t, bool has_point,
                FitResult& result) {
-  for (int c = 0; c < problem.num_clips(); ++c) note_tracks_left_out(problem.clip(c), input.options, result);
+  for (int c = 0; c < problem.num_clips(); ++c) {
+    note_tracks_left_out(problem.clip(c), input.options, result);
+    note_head_motion(problem.clip(c), result);
+  }
   result.notes.push_back(
       "Each track is weighted by its own covariance in every frame; the error of its first pixel, which "
       "places "

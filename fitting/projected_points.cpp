@@ -1,5 +1,7 @@
 #include "fitting/projected_points.h"
 
+#include <algorithm>
+
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
@@ -26,6 +28,19 @@ ProjectedPoints::ProjectedPoints(const SkinMesh& mesh, std::vector<adjoint::Mate
       require(i >= 0 && i < interpolation_.num_points(), "ProjectedPoints: point index out of range");
 }
 
+void ProjectedPoints::set_poses(int camera, std::vector<Camera> by_frame) {
+  require(camera >= 0 && camera < static_cast<int>(cameras_.size()) && !by_frame.empty(),
+          "ProjectedPoints: poses of no camera");
+  poses_.resize(cameras_.size());
+  poses_[camera] = std::move(by_frame);
+}
+
+const Camera& ProjectedPoints::camera_of(int point, int frame) const {
+  const std::size_t c = camera_of_point_[point];
+  if (c >= poses_.size() || poses_[c].empty()) return cameras_[c];
+  return poses_[c][std::min(static_cast<std::size_t>(std::max(frame, 0)), poses_[c].size() - 1)];
+}
+
 const std::vector<int>& ProjectedPoints::points_in(int frame) const {
   static const std::vector<int> none;
   return frame >= 0 && frame < static_cast<int>(points_in_frame_.size()) ? points_in_frame_[frame] : none;
@@ -39,7 +54,7 @@ VectorXd ProjectedPoints::values(int frame, const State& state) const {
   VectorXd out(size(frame));
   Eigen::Index row = 0;
   for (const int i : points_in(frame)) {
-    out.segment<2>(row) = camera_of(i).project(interpolation_.position(i, state.u));
+    out.segment<2>(row) = camera_of(i, frame).project(interpolation_.position(i, state.u));
     row += 2;
   }
   return out;
@@ -49,8 +64,8 @@ MatrixXd ProjectedPoints::tangent(int frame, const State& state, const MatrixXd&
   MatrixXd out(size(frame), du.cols());
   Eigen::Index row = 0;
   for (const int i : points_in(frame)) {
-    out.middleRows<2>(row) =
-        camera_of(i).projection_jacobian(interpolation_.position(i, state.u)) * interpolation_.tangent(i, du);
+    out.middleRows<2>(row) = camera_of(i, frame).projection_jacobian(interpolation_.position(i, state.u)) *
+                             interpolation_.tangent(i, du);
     row += 2;
   }
   return out;
@@ -60,7 +75,7 @@ void ProjectedPoints::adjoint(int frame, const State& state, const VectorXd& wei
                               VectorXd&) const {
   Eigen::Index row = 0;
   for (const int i : points_in(frame)) {
-    const auto jacobian = camera_of(i).projection_jacobian(interpolation_.position(i, state.u));
+    const auto jacobian = camera_of(i, frame).projection_jacobian(interpolation_.position(i, state.u));
     interpolation_.adjoint(i, jacobian.transpose() * weights.segment<2>(row), u_bar);
     row += 2;
   }

@@ -23,6 +23,10 @@ class ProjectedPoints final : public adjoint::Output {
                   std::vector<Camera> cameras, std::vector<int> camera_of_point,
                   std::vector<std::vector<int>> points_in_frame);
 
+  /// Poses of a camera by frame, from the first on: one that moves about the skin. Frames beyond the list
+  /// have the last. Throws ContractError for no such camera and for an empty list.
+  void set_poses(int camera, std::vector<Camera> by_frame);
+
   int size(int frame) const override;
   /// px; NaN for a point behind the camera.
   VectorXd values(int frame, const State& state) const override;
@@ -36,10 +40,11 @@ class ProjectedPoints final : public adjoint::Output {
   const std::vector<int>& points_in(int frame) const;
 
  private:
-  const Camera& camera_of(int point) const { return cameras_[camera_of_point_[point]]; }
+  const Camera& camera_of(int point, int frame) const;
 
   adjoint::PointInterpolation interpolation_;
   std::vector<Camera> cameras_;
+  std::vector<std::vector<Camera>> poses_;  ///< per camera by frame; empty where it stands still
   std::vector<int> camera_of_point_;
   std::vector<std::vector<int>> points_in_frame_;
 };

@@ -30,9 +30,9 @@ inline Camera make_camera() {
 }
 
 /// Points of the outer surface seen in all frames 0..n of the scene's run, each pixel with independent
-/// Gaussian noise of `sigma` px per axis (frame 0 included).
-inline TrackSet make_tracks(const Scene& scene, const Camera& camera, int points_per_face, double sigma,
-                            unsigned seed) {
+/// Gaussian noise of `sigma` px per axis (frame 0 included). The camera has a pose for every frame, or one.
+inline TrackSet make_tracks(const Scene& scene, const std::vector<Camera>& by_frame, int points_per_face,
+                            double sigma, unsigned seed) {
   const SceneModel model(scene);
   RunOptions options = model.run_options();
   options.minimiser.polish = true;
@@ -54,8 +54,9 @@ inline TrackSet make_tracks(const Scene& scene, const Camera& camera, int points
   const adjoint::PointInterpolation at(model.model().mesh, points);
   TrackSet set;
   for (int i = 0; i < at.num_points(); ++i) {
-    Track track{i, camera.name, {}};
+    Track track{i, by_frame[0].name, {}};
     for (int f = 0; f <= run.frames(); ++f) {
+      const Camera& camera = by_frame[by_frame.size() > 1 ? f : 0];
       Observation o;
       o.frame = f;
       o.time_s = f / options.frame_rate;
@@ -67,6 +68,11 @@ inline TrackSet make_tracks(const Scene& scene, const Camera& camera, int points
     set.tracks.push_back(std::move(track));
   }
   return set;
+}
+
+inline TrackSet make_tracks(const Scene& scene, const Camera& camera, int points_per_face, double sigma,
+                            unsigned seed) {
+  return make_tracks(scene, std::vector<Camera>{camera}, points_per_face, sigma, seed);
 }
 
 inline Scene drag_scene(int frames, std::vector<std::string> settings = {}) {
