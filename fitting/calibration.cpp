@@ -1,5 +1,6 @@
 #include "fitting/calibration.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -18,6 +19,7 @@ constexpr int kLeastPhotographs = 3;    ///< two determine the lens in principle
 constexpr int kMostGroups = 8;          ///< of photographs, for predictions and the jackknife
 constexpr double kOutlierFactor = 3;    ///< times the median of the photographs
 constexpr double kOutlierFloor = 0.25;  ///< px: below it nothing is an outlier
+constexpr double kMostExcess = 1.2;     ///< mean square error of the model taken, over that of the best
 constexpr int kCells = 10;              ///< per side, for the coverage
 
 using Values = std::array<double, kNumLensParameters>;
@@ -88,7 +90,7 @@ struct Fit {
   cv::Mat K, D;
   std::vector<cv::Mat> rvecs, tvecs;
   std::vector<double> rms;  ///< px, per photograph
-  Values values{}, deviations{};
+  Values values{};
 };
 
 class Fitter {
@@ -118,17 +120,50 @@ class Fitter {
         if (!has[static_cast<std::size_t>(k)]) f.D.at<double>(k) = 0;
       flags |= cv::CALIB_USE_INTRINSIC_GUESS;
     }
-    cv::Mat intrinsic, extrinsic, errors;
-    cv::calibrateCamera(object, image, picture_, f.K, f.D, f.rvecs, f.tvecs, intrinsic, extrinsic, errors,
-                        flags, cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 60, 1e-10));
+    cv::Mat errors;
+    cv::calibrateCamera(object, image, picture_, f.K, f.D, f.rvecs, f.tvecs, cv::noArray(), cv::noArray(),
+                        errors, flags,
+                        cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 60, 1e-10));
     f.D = f.D.reshape(1, 1).colRange(0, 5).clone();
     for (int i = 0; i < errors.rows; ++i) f.rms.push_back(errors.at<double>(i));
     f.values = {f.K.at<double>(0, 0), f.K.at<double>(1, 1), f.K.at<double>(0, 2),
                 f.K.at<double>(1, 2), f.D.at<double>(0),    f.D.at<double>(1),
                 f.D.at<double>(2),    f.D.at<double>(3),    f.D.at<double>(4)};
-    for (int k = 0; k < kNumLensParameters; ++k)
-      f.deviations[static_cast<std::size_t>(k)] = intrinsic.at<double>(k);
     return f;
+  }
+
+  /// Deviations of the lens parameters if all corners erred independently and alike, σ² from what is left;
+  /// 0 for terms that were not fitted. OpenCV has them too; those of 4.6 are too large by √2, since it
+  /// counted corners, not coordinates.
+  Values deviations(const Fit& f, const std::vector<int>& used, const Flags& has) const {
+    std::vector<int> fitted = {0, 1, 2, 3};  // of kLensParameters
+    for (int k = 0; k < 5; ++k)
+      if (has[static_cast<std::size_t>(k)]) fitted.push_back(4 + k);
+    const auto n = static_cast<Eigen::Index>(fitted.size());
+    MatrixXd hessian = MatrixXd::Zero(n, n);  // of the lens, the poses eliminated
+    double squares = 0, coordinates = 0;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      const auto photograph = static_cast<std::size_t>(used[i]);
+      Points2 projected;
+      cv::Mat all;  // columns: rotation, translation, fx fy, cx cy, distortion
+      cv::projectPoints(object_[photograph], f.rvecs[i], f.tvecs[i], f.K, f.D, projected, all);
+      squares += std::pow(cv::norm(projected, image_[photograph], cv::NORM_L2), 2);
+      coordinates += all.rows;
+      MatrixXd lens(all.rows, n), pose(all.rows, 6);
+      for (int row = 0; row < all.rows; ++row) {
+        for (Eigen::Index k = 0; k < n; ++k)
+          lens(row, k) = all.at<double>(row, 6 + fitted[static_cast<std::size_t>(k)]);
+        for (int k = 0; k < 6; ++k) pose(row, k) = all.at<double>(row, k);
+      }
+      const MatrixXd cross = pose.transpose() * lens;
+      hessian += lens.transpose() * lens - cross.transpose() * (pose.transpose() * pose).ldlt().solve(cross);
+    }
+    const double freedom = coordinates - static_cast<double>(n) - 6 * static_cast<double>(used.size());
+    const MatrixXd covariance = squares / freedom * hessian.ldlt().solve(MatrixXd::Identity(n, n));
+    Values sigma{};
+    for (Eigen::Index k = 0; k < n; ++k)
+      sigma[static_cast<std::size_t>(fitted[static_cast<std::size_t>(k)])] = std::sqrt(covariance(k, k));
+    return sigma;
   }
 
   /// Mean square of a photograph that the lens was not fitted to, px²: only its pose is fitted.
@@ -187,9 +222,11 @@ Fit without_outliers(const Fitter& fitter, std::vector<CalibrationPhotograph>& p
   }
 }
 
-/// Group of the k-th of the used photographs: neighbours, often alike, come into different groups.
-std::size_t group_of(std::size_t k, std::size_t groups) {
-  return k % groups;
+/// Group of the k-th of the used photographs. Neighbours are often alike, and err alike: they stay together,
+/// since a group that has its like among the others shows neither how well unseen photographs are predicted nor
+/// how much the lens depends on it.
+std::size_t group_of(std::size_t k, std::size_t groups, std::size_t used) {
+  return k * groups / used;
 }
 
 struct Predictions {
@@ -197,41 +234,53 @@ struct Predictions {
   std::vector<Values> without;  ///< the lens without each group
 };
 
-/// Index into the ladder.
-std::size_t simplest_as_good_as_the_best(const std::vector<Predictions>& models) {
-  std::size_t best = 0;
-  const auto mean = [](const std::vector<double>& e) {
-    return std::accumulate(e.begin(), e.end(), 0.0) / static_cast<double>(e.size());
-  };
-  for (std::size_t m = 1; m < models.size(); ++m)
-    if (mean(models[m].errors) < mean(models[best].errors)) best = m;
-  const std::size_t n = models[best].errors.size();
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    if (num_terms(kLadder[m].has) >= num_terms(kLadder[best].has)) continue;
-    std::vector<double> difference(n);
-    for (std::size_t i = 0; i < n; ++i) difference[i] = models[m].errors[i] - models[best].errors[i];
-    const double excess = mean(difference);
-    double variance = 0;
-    for (const double d : difference) variance += (d - excess) * (d - excess);
-    variance /= static_cast<double>(n - 1);
-    if (excess <=
-        student_quantile_975(static_cast<double>(n - 1)) * std::sqrt(variance / static_cast<double>(n)))
-      return m;
-  }
-  return best;
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-void fill_parameters(const Fit& fit, const Predictions& predictions, const Flags& has, Calibration* c) {
+/// Whether chance explains that `best` predicts the photographs better than `other`: Student's t, 95 %, on the
+/// logarithms of the ratios. Errors differ by factors from photograph to photograph, and their differences with
+/// them: on those one bad photograph would hide what all of them say.
+bool is_as_good(const std::vector<double>& other, const std::vector<double>& best) {
+  if (mean(other) > kMostExcess * mean(best)) return false;
+  constexpr double kExact = 1e-12;  // px²: below it only rounding is left
+  const auto n = static_cast<double>(best.size());
+  std::vector<double> ratios, squares;
+  for (std::size_t i = 0; i < best.size(); ++i)
+    ratios.push_back(std::log(std::max(other[i], kExact) / std::max(best[i], kExact)));
+  const double excess = mean(ratios);
+  for (const double ratio : ratios) squares.push_back((ratio - excess) * (ratio - excess));
+  return excess <= student_quantile_975(n - 1) * std::sqrt(mean(squares) / (n - 1));
+}
+
+/// Index into the ladder.
+std::size_t simplest_as_good_as_the_best(const std::vector<Predictions>& models) {
+  const auto error = [&models](std::size_t m) { return mean(models[m].errors); };
+  std::size_t best = 0;
+  for (std::size_t m = 1; m < models.size(); ++m)
+    if (error(m) < error(best)) best = m;
+  std::size_t chosen = best;
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const int less = num_terms(kLadder[chosen].has) - num_terms(kLadder[m].has);
+    if ((less > 0 || (less == 0 && error(m) < error(chosen))) &&
+        is_as_good(models[m].errors, models[best].errors))
+      chosen = m;
+  }
+  return chosen;
+}
+
+void fill_parameters(const Fit& fit, const Values& deviations, const Predictions& predictions,
+                     const Flags& has, Calibration* c) {
   const auto groups = static_cast<double>(predictions.without.size());
   for (std::size_t k = 0; k < kNumLensParameters; ++k) {
     LensParameter& p = c->parameters[k];
     p.value = fit.values[k];
     p.is_fitted = k < 4 || has[k - 4];
     if (!p.is_fitted) continue;
-    double mean = 0, squares = 0;
-    for (const Values& v : predictions.without) mean += v[k] / groups;
-    for (const Values& v : predictions.without) squares += (v[k] - mean) * (v[k] - mean);
-    p.linear_sigma = fit.deviations[k];
+    double middle = 0, squares = 0;
+    for (const Values& v : predictions.without) middle += v[k] / groups;
+    for (const Values& v : predictions.without) squares += (v[k] - middle) * (v[k] - middle);
+    p.linear_sigma = deviations[k];
     p.jackknife_sigma = std::sqrt((groups - 1) / groups * squares);
     p.sigma = std::max(p.linear_sigma, p.jackknife_sigma);
     const double linear = student_quantile_975(1e6) * p.linear_sigma;
@@ -343,11 +392,11 @@ std::optional<Calibration> calibrate(std::vector<CalibrationPhotograph> photogra
         if (options.progress && !options.progress(static_cast<int>(m * groups + g), all)) return std::nullopt;
         std::vector<int> kept;
         for (std::size_t k = 0; k < used.size(); ++k)
-          if (group_of(k, groups) != g) kept.push_back(used[k]);
+          if (group_of(k, groups, used.size()) != g) kept.push_back(used[k]);
         const Fit f = fitter.fit(kept, kLadder[m].has, &robust);
         predictions[m].without.push_back(f.values);
-        for (std::size_t k = g; k < used.size(); k += groups)
-          predictions[m].errors[k] = fitter.predicted(f, used[k]);
+        for (std::size_t k = 0; k < used.size(); ++k)
+          if (group_of(k, groups, used.size()) == g) predictions[m].errors[k] = fitter.predicted(f, used[k]);
       }
     }
     const std::size_t chosen = simplest_as_good_as_the_best(predictions);
@@ -355,16 +404,15 @@ std::optional<Calibration> calibrate(std::vector<CalibrationPhotograph> photogra
     for (const double value : fit.values)
       if (!std::isfinite(value))
         throw InputError("calibrate", "no lens that fits", "photographs of one flat board");
-    for (std::size_t m = 0; m < kLadder.size(); ++m) {
-      const std::vector<double>& e = predictions[m].errors;
-      const double mean = std::accumulate(e.begin(), e.end(), 0.0) / static_cast<double>(e.size());
-      c.models.push_back({kLadder[m].name, num_terms(kLadder[m].has), std::sqrt(mean), m == chosen});
-    }
+    for (std::size_t m = 0; m < kLadder.size(); ++m)
+      c.models.push_back(
+          {kLadder[m].name, num_terms(kLadder[m].has), std::sqrt(mean(predictions[m].errors)), m == chosen});
     c.model = kLadder[chosen].name;
     c.photographs = std::move(photographs);
     c.used = static_cast<int>(used.size());
     fill_camera(fit, width, height, &c.camera);
-    fill_parameters(fit, predictions[chosen], kLadder[chosen].has, &c);
+    fill_parameters(fit, fitter.deviations(fit, used, kLadder[chosen].has), predictions[chosen],
+                    kLadder[chosen].has, &c);
     fill_photographs(fit, used, &c);
   } catch (const cv::Exception& e) {
     throw InputError("calibrate", "corners that no lens explains (" + e.err + ")",

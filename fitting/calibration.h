@@ -11,13 +11,14 @@
 // Which distortion. Each of a ladder of models, from none to k1 k2 p1 p2 k3, is fitted without some of the
 // photographs and judged by how well it predicts those (their poses alone are fitted). Terms that the
 // photographs do not determine predict worse. Taken is the model with the fewest terms whose mean square
-// error is not above that of the best by more than differences between photographs
-// make likely (95 %, Student's t).
+// errors are not above those of the best by more than chance (their ratios over the photographs, logarithms,
+// 95 % of Student's t), and on average not by more than a fifth.
 //
 // How sure. Intervals of 95 % come from the larger of two deviations: that of the linearised fit with
-// independent corners (OpenCV's), and the jackknife over groups of photographs, which sees what the corners of
-// a photograph err alike (a board that is not flat): σ² = (g − 1)/g Σ_j (p_j − p̄)², p_j fitted without group
-// j, Student's t with g − 1 degrees. A term that is not in the model has no interval.
+// independent corners, σ² = |r|²/(2 corners − parameters), and the jackknife over groups of photographs, which
+// sees what the corners of a photograph err alike (a board that is not flat): σ² = (g − 1)/g Σ_j (p_j − p̄)²,
+// p_j fitted without group j, Student's t with g − 1 degrees. A group is photographs that follow each other,
+// which are often alike. A term that is not in the model has no interval.
 // Tests: tests/fitting/calibration_test.cpp
 #pragma once
 

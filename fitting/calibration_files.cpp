@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -29,6 +30,23 @@ std::string left_out_terms(const Calibration& c) {
     if (!c.parameters[static_cast<std::size_t>(k)].is_fitted)
       names += (names.empty() ? "" : " ") + std::string(kLensParameters[static_cast<std::size_t>(k)]);
   return names;
+}
+
+/// What more terms than the chosen ones would bring; empty when there are no more.
+std::string left_out_text(const Calibration& c) {
+  const std::string names = left_out_terms(c);
+  const auto chosen =
+      std::find_if(c.models.begin(), c.models.end(), [](const LensModel& m) { return m.is_chosen; });
+  if (names.empty() || chosen == c.models.end()) return {};
+  double richer = std::numeric_limits<double>::infinity();
+  for (const LensModel& m : c.models)
+    if (m.num_terms > chosen->num_terms) richer = std::min(richer, m.predicted_rms);
+  const std::string compared =
+      short_text(richer, 3) + " px rms instead of " + short_text(chosen->predicted_rms, 3);
+  return " (" + names + " left out: photographs a lens was not fitted to are predicted " +
+         (richer < chosen->predicted_rms ? "better with more by no more than chance, "
+                                         : "no better with more, ") +
+         compared + ")";
 }
 
 constexpr double kMargin = 16, kPictureSide = 640, kListWidth = 330, kLine = 16;  // px of the SVG
@@ -95,11 +113,7 @@ std::string calibration_text(const Calibration& c) {
                           short_text(most, 3) + ", worst corner " + short_text(worst, 3) + ")");
   add("coverage", fixed_text(100 * c.coverage, 0) + " % of the picture, out to " +
                       fixed_text(100 * c.reach, 0) + " % of the way from its middle to its corners");
-  std::string model = c.model == "none" ? "no distortion" : c.model;
-  if (const std::string out = left_out_terms(c); !out.empty())
-    model +=
-        " (" + out + " left out: photographs a lens was not fitted to are predicted no better with more)";
-  add("distortion", model);
+  add("distortion", (c.model == "none" ? "no distortion" : c.model) + left_out_text(c));
   text += "\n              value         95 % interval\n";
   for (int k = 0; k < kNumLensParameters; ++k) {
     const LensParameter& p = c.parameters[static_cast<std::size_t>(k)];

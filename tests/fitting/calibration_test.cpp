@@ -236,6 +236,75 @@ TEST(Calibration, IntervalsHoldTheTruthAndOnlyDeterminedTermsAreFitted) {
   EXPECT_GE(expected_models, 3) << "a fourth may be the one in twenty";
 }
 
+// With few photographs too: the errors without distortion differ by factors between them, all are large.
+TEST(Calibration, DistortionIsNotLeftOutBecausePhotographsAreFew) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const auto c =
+        calibrate(corners_with_noise(truth({0.19, -0.36, 0, 0, 0}), 4, 0.3, 0.1, seed), 640, 480, {});
+    ASSERT_TRUE(c);
+    double best = 1e30, chosen = 0;
+    for (const LensModel& m : c->models) {
+      best = std::min(best, m.predicted_rms);
+      if (m.is_chosen) chosen = m.predicted_rms;
+      std::printf("%s: %.3f px%s\n", m.name.c_str(), m.predicted_rms, m.is_chosen ? " chosen" : "");
+    }
+    EXPECT_NE(c->model, "none");
+    EXPECT_LT(chosen, std::sqrt(1.2) * best + 1e-12) << "no better with more must be true";
+    EXPECT_THAT(calibration_text(*c), ::testing::ContainsRegex("no better with more|no more than chance"));
+  }
+}
+
+// The deviation of the linearised fit is that of many draws of the noise, no smaller and no larger.
+TEST(Calibration, LinearisedDeviationsAreThoseOfManyDraws) {
+  constexpr int kDraws = 40;
+  const Camera camera = truth({-0.2, 0, 0, 0, 0});
+  const auto exact = values_of(camera);
+  std::array<double, 5> squares{}, stated{};
+  int draws = 0;
+  for (unsigned seed = 1; seed <= kDraws; ++seed) {
+    const auto c = calibrate(corners_with_noise(camera, 5, 0.5, 0.1, 100 + seed), 640, 480, {});
+    ASSERT_TRUE(c);
+    if (c->model != "k1") continue;
+    ++draws;
+    for (std::size_t k = 0; k < squares.size(); ++k) {
+      squares[k] += std::pow(c->parameters[k].value - exact[k], 2);
+      stated[k] += std::pow(c->parameters[k].linear_sigma, 2);
+    }
+  }
+  EXPECT_GE(draws, 0.7 * kDraws);
+  double log_ratio = 0;
+  for (std::size_t k = 0; k < squares.size(); ++k) {
+    const double ratio = std::sqrt(stated[k] / squares[k]);
+    log_ratio += std::log(ratio) / static_cast<double>(squares.size());
+    std::printf("%s: stated %.3f of the spread of %d draws\n", kLensParameters[k], ratio, draws);
+    EXPECT_NEAR(ratio, 1, 0.3) << kLensParameters[k];
+  }
+  EXPECT_NEAR(std::exp(log_ratio), 1, 0.15);
+}
+
+// A second copy of every photograph tells nothing new, whatever its corners err alike.
+TEST(Calibration, CopiesOfPhotographsDoNotNarrowTheIntervals) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> bend(0, 0.4);  // px, of a board that is not flat
+  std::vector<CalibrationPhotograph> once = corners_with_noise(truth({-0.2, 0, 0, 0, 0}), 8, 0.5, 0.02, 9);
+  for (CalibrationPhotograph& p : once) {
+    const Vec2 by(bend(random), bend(random));
+    for (std::size_t i = 0; i < p.board.corners.size(); ++i)
+      p.board.corners[i] += std::pow(static_cast<double>(i % kBoard.columns) / 4 - 1, 2) * by;
+  }
+  std::vector<CalibrationPhotograph> twice;
+  for (const CalibrationPhotograph& p : once) twice.insert(twice.end(), 2, p);
+  const auto one = calibrate(once, 640, 480, {}), two = calibrate(twice, 640, 480, {});
+  ASSERT_TRUE(one && two);
+  ASSERT_EQ(one->model, two->model);
+  ASSERT_EQ(two->used, 16);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const LensParameter &a = one->parameters[k], &b = two->parameters[k];
+    std::printf("%s: %.3f, with copies %.3f\n", kLensParameters[k], a.high - a.low, b.high - b.low);
+    EXPECT_GT(b.high - b.low, 0.98 * (a.high - a.low)) << kLensParameters[k];
+  }
+}
+
 TEST(Calibration, PhotographsAtOddsWithTheOthersAreNamed) {
   auto photographs = corners_with_noise(truth({-0.2, 0, 0, 0, 0}), 9, 0.5, 0.05, 5);
   for (std::size_t i = 0; i < 9; ++i) photographs[4].board.corners[i] += Vec2(6, -4);  // a bent first row

@@ -35,5 +35,20 @@ TEST(RealCalibration, Camera201) {
   EXPECT_GT(fx.jackknife_sigma, 2 * fx.linear_sigma) << "corners of a photograph err alike";
 }
 
+// Four of them determine the distortion too: without it they are predicted four times worse.
+TEST(RealCalibration, FourPhotographsOfCamera201) {
+  RHYTID_REAL_FILE_OR_SKIP(path, "calibration/camera_201");
+  std::vector<std::string> files;
+  for (const char* number : {"02", "04", "06", "08"})
+    files.push_back((std::filesystem::path(path) / ("201_" + std::string(number) + ".jpg")).string());
+  const auto search = find_boards(files, BoardSize{19, 14}, {});
+  ASSERT_TRUE(search);
+  const auto c = calibrate(search->photographs, search->width, search->height, {});
+  ASSERT_TRUE(c);
+  std::printf("%s", calibration_text(*c).c_str());
+  EXPECT_EQ(c->model, "k1 k2");
+  EXPECT_LT(c->rms_px, 0.6);
+}
+
 }  // namespace
 }  // namespace rhytid::fitting
