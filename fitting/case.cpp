@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <tuple>
 
 #include "fitting/case_rules.h"
 #include "fitting/colmap.h"
@@ -181,15 +182,21 @@ std::vector<Scene> scenes_of_fit(const Case& c, const LocatedJson& written) {
   }
 }
 
-/// Scene and settings of a truth; of one without a scene those of the fit come first.
-void read_truth_of(const LocatedJson& located, const std::string& pointer, const json& truth,
-                   const std::string& scene, const std::vector<Setting>& scene_settings,
-                   std::string& truth_scene, std::vector<Setting>& truth_settings) {
+/// What a truth was changed from: scene and settings of a fit, and those settings that count also for a truth with
+/// a scene of its own.
+struct TruthBase {
+  std::string scene;
+  std::vector<Setting> settings, own;
+};
+
+/// Scene and settings of the truth that the case has at `pointer`. One without a scene is that of the fit.
+std::pair<std::string, std::vector<Setting>> read_truth(const LocatedJson& located,
+                                                        const std::string& pointer, const TruthBase& base) {
+  const json& truth = located.json.at(json::json_pointer(pointer));
   const bool has_scene = truth.contains("scene");
-  truth_scene = has_scene ? truth["scene"].get<std::string>() : scene;
-  truth_settings = has_scene ? std::vector<Setting>() : scene_settings;
-  for (const Setting& setting : settings_at(located, pointer + "/settings"))
-    truth_settings.push_back(setting);
+  std::vector<Setting> settings = has_scene ? base.own : base.settings;
+  for (const Setting& setting : settings_at(located, pointer + "/settings")) settings.push_back(setting);
+  return {has_scene ? truth["scene"].get<std::string>() : base.scene, settings};
 }
 
 void read_clips(const LocatedJson& located, Case& c) {
@@ -211,14 +218,12 @@ void read_clips(const LocatedJson& located, Case& c) {
     clip.scene_settings = c.scene_settings;
     const std::vector<Setting> own = settings_at(located, pointer + "/settings");
     clip.scene_settings.insert(clip.scene_settings.end(), own.begin(), own.end());
-    if (j.contains("truth")) {
-      read_truth_of(located, pointer + "/truth", j["truth"], clip.scene, clip.scene_settings,
-                    clip.truth_scene, clip.truth_settings);
-    } else {
-      clip.truth_scene = c.truth_scene;
-      clip.truth_settings = c.truth_settings;
-      clip.truth_settings.insert(clip.truth_settings.end(), own.begin(), own.end());
-    }
+    if (j.contains("truth"))
+      std::tie(clip.truth_scene, clip.truth_settings) =
+          read_truth(located, pointer + "/truth", {clip.scene, clip.scene_settings, {}});
+    else if (root.contains("truth"))  // that of the case, as if the clip were the case
+      std::tie(clip.truth_scene, clip.truth_settings) =
+          read_truth(located, "/truth", {clip.scene, clip.scene_settings, own});
     const auto view = [&](const json& v) {
       const auto text = [&v](const char* key) { return v.value(key, ""); };
       return ViewCase{"", v.value("camera", c.camera), text("footage"), text("tracks")};
@@ -271,10 +276,9 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
   Case c;
   c.file = path, c.name = root["name"];
   c.scene = root["scene"], c.scene_settings = settings_at(located, "/settings");
-  if (root.contains("truth")) {
-    read_truth_of(located, "/truth", root["truth"], c.scene, c.scene_settings, c.truth_scene,
-                  c.truth_settings);
-  }
+  if (root.contains("truth"))
+    std::tie(c.truth_scene, c.truth_settings) =
+        read_truth(located, "/truth", {c.scene, c.scene_settings, {}});
   c.camera = root.value("camera", ""), c.camera_image = root["camera_image"];
   if (root.contains("camera_unit")) c.camera_unit = root["camera_unit"].get<double>();
   c.footage = root["footage"], c.tracks = root["tracks"];

@@ -13,6 +13,8 @@
 // each clip; without such a beginning it is shared by all clips whose scene has it.
 //
 // A truth without a scene of its own is the fit's scene, settings included, changed by the truth's settings.
+// A clip without a truth has that of the case, with the clip's scene and settings; where that truth has a scene
+// of its own, it is changed by the clip's settings, then by the truth's.
 // Relative input paths are resolved against the case file; footage and tracks that do not exist there are
 // looked for, and written, in the output folder. Tests: tests/fitting/case_test.cpp
 #pragma once

@@ -93,7 +93,7 @@ std::vector<Rule> clip_rules() {
       {.pointer = clip + "/truth",
        .type = RuleType::object,
        .doc = "What made the footage of a twin experiment; default: the truth of the case, with the clip's "
-              "settings."},
+              "scene and settings."},
       {.pointer = clip + "/truth/scene", .type = RuleType::path, .doc = "Scene; default: that of the clip."},
       {.pointer = clip + "/truth/settings",
        .type = RuleType::array,

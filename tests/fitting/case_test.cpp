@@ -206,13 +206,43 @@ TEST_F(CaseTest, ClipsHaveWhatTheyLeaveOutFromTheCase) {
   EXPECT_THAT(texts(left.truth_settings), testing::ElementsAre("/time/frames=2", "/skin/order=3"));
   EXPECT_EQ(far.camera, left.camera);
   EXPECT_THAT(texts(far.truth_settings),
-              testing::ElementsAre("/time/frames=2", "/skin/order=3", "/time/offset=0.01"));
+              testing::ElementsAre("/time/frames=2", "/time/offset=0.01", "/skin/order=3"));
   EXPECT_EQ(folder_of_view(c, 1, 1, "out"), "out/up/far");
   EXPECT_EQ(view_named(c, "up/far"), (std::pair{1, 1}));
   EXPECT_THROW(view_named(c, "up"), InputError);
   // Clips go by their names in settings too.
   EXPECT_EQ(load_case(path, {"/clips/up/settings/0=/time/offset=0.02"}).clips[1].scene_settings.back().text,
             "/time/offset=0.02");
+}
+
+// The truth of the case is that of a clip as if the clip were the case: its scene where the truth has none, its
+// settings before those of the truth.
+TEST_F(CaseTest, ClipsResolveTheTruthOfTheCase) {
+  write("other.json", test::drag_scene(2, 3));
+  write("true.json", test::drag_scene(2, 3));
+  const auto clips = [this](const std::string& truth) {
+    return load_case(
+               write("case.json", R"({"scene": "scene.json", "settings": ["/time/frames=2"], )" + truth + R"(
+      "clips": [{"name": "same"},
+                {"name": "other", "scene": "other.json", "settings": ["/time/offset=0.01"]},
+                {"name": "own", "scene": "other.json", "settings": ["/time/offset=0.01"],
+                 "truth": {"scene": "true.json", "settings": ["/skin/order=2"]}}]})"))
+        .clips;
+  };
+  const auto path = [this](const char* name) { return (folder_ / name).string(); };
+  const std::vector<ClipCase> plain = clips(R"("truth": {"settings": ["/skin/order=3"]},)");
+  EXPECT_EQ(plain[0].truth_scene, path("scene.json"));
+  EXPECT_EQ(plain[1].truth_scene, path("other.json"));
+  EXPECT_THAT(texts(plain[1].truth_settings),
+              testing::ElementsAre("/time/frames=2", "/time/offset=0.01", "/skin/order=3"));
+  const std::vector<ClipCase> named =
+      clips(R"("truth": {"scene": "true.json", "settings": ["/skin/order=3"]},)");
+  EXPECT_EQ(named[1].truth_scene, path("true.json"));
+  EXPECT_THAT(texts(named[0].truth_settings), testing::ElementsAre("/skin/order=3"));
+  EXPECT_THAT(texts(named[1].truth_settings), testing::ElementsAre("/time/offset=0.01", "/skin/order=3"));
+  EXPECT_EQ(named[2].truth_scene, path("true.json"));
+  EXPECT_THAT(texts(named[2].truth_settings), testing::ElementsAre("/skin/order=2"));
+  EXPECT_EQ(clips("")[1].truth_scene, "");
 }
 
 TEST_F(CaseTest, WrongClipsAreRefused) {
