@@ -45,6 +45,15 @@ FitCase read_fit(const json& j) {
   c.first_frame = j["first_frame"], c.last_frame = j["last_frame"];
   c.rim_margin = j["rim_margin"], c.gauge_layer = j["gauge_layer"];
   c.discretisation_check = j["discretisation_check"];
+  if (j.contains("wrinkles")) {
+    const json& w = j["wrinkles"];
+    WrinkleLine line;
+    for (int a = 0; a < 3; ++a) line.line.from[a] = w["from"][a], line.line.to[a] = w["to"][a];
+    line.points = w["points"];
+    line.band.shortest = w["shortest"];
+    if (w.contains("longest")) line.band.longest = w["longest"];
+    c.wrinkles = line;
+  }
   for (const json& region : j.value("still", json::array())) {
     StillRegion r{region["name"]};
     for (int a = 0; a < 3; ++a) r.low[a] = region["box"]["low"][a], r.high[a] = region["box"]["high"][a];
@@ -201,8 +210,8 @@ std::pair<std::string, std::vector<Setting>> read_truth(const LocatedJson& locat
 
 void read_clips(const LocatedJson& located, Case& c) {
   const json& root = located.json;
-  for (const char* key : {"footage", "tracks"})
-    if (!root[key].get<std::string>().empty())
+  for (const char* key : {"footage", "tracks", "measurements"})
+    if (!root.value(key, "").empty())
       throw InputError(located.where(std::string("/") + key) + ": /" + key, shown_json(root[key]),
                        "that each of the clips has its own");
   for (std::size_t i = 0; i < root["clips"].size(); ++i) {
@@ -228,6 +237,7 @@ void read_clips(const LocatedJson& located, Case& c) {
       const auto text = [&v](const char* key) { return v.value(key, ""); };
       return ViewCase{"", v.value("camera", c.camera), text("footage"), text("tracks")};
     };
+    clip.measurements = j.value("measurements", "");
     if (j.contains("cameras"))
       for (const json& v : j["cameras"]) {
         clip.views.push_back(view(v));
@@ -281,7 +291,7 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
         read_truth(located, "/truth", {c.scene, c.scene_settings, {}});
   c.camera = root.value("camera", ""), c.camera_image = root["camera_image"];
   if (root.contains("camera_unit")) c.camera_unit = root["camera_unit"].get<double>();
-  c.footage = root["footage"], c.tracks = root["tracks"];
+  c.footage = root["footage"], c.tracks = root["tracks"], c.measurements = root.value("measurements", "");
   c.render = read_render(root["render"]);
   c.track = read_track(root["track"]);
   if (c.track.roi && ((*c.track.roi)[2] < 1 || (*c.track.roi)[3] < 1))
@@ -291,6 +301,9 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
     throw InputError(located.where("/track/window") + ": /track/window", std::to_string(c.track.window),
                      "an odd number of px, so that the window has a middle");
   c.fit = read_fit(root["fit"]);
+  if (c.fit.wrinkles && !(c.fit.wrinkles->band.shortest < c.fit.wrinkles->band.longest))
+    throw InputError(located.where("/fit/wrinkles/longest") + ": /fit/wrinkles/longest",
+                     shown_json(located.json["fit"]["wrinkles"]["longest"]), "more than shortest");
   for (std::size_t i = 0; i < c.fit.still.size(); ++i)
     if (!(c.fit.still[i].low.array() < c.fit.still[i].high.array()).all()) {
       const std::string pointer = "/fit/still/" + std::to_string(i) + "/box";

@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "fitting/head_motion.h"
+#include "fitting/measurements.h"
 #include "sim/scene/located_json.h"
 #include "sim/scene/parameter.h"
 
@@ -72,6 +73,7 @@ struct FitCase {
   double rim_margin = 1;                ///< mm: tracks closer to the rim of the patch are left out
   /// Where tracked points stand still on the head: its motion is taken out by them. Empty: it stands still.
   std::vector<StillRegion> still;
+  std::optional<WrinkleLine> wrinkles;  ///< where measured wrinkles are
   /// Whether what the discretisation does to the answer is estimated, and enters the intervals.
   bool discretisation_check = true;
   /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden
@@ -93,6 +95,7 @@ struct ClipCase {
   std::string truth_scene;
   std::vector<Setting> truth_settings;
   std::vector<ViewCase> views;  ///< at least one
+  std::string measurements;     ///< as that of Case
 };
 
 struct Case {
@@ -105,6 +108,7 @@ struct Case {
   std::string camera_image;           ///< when `camera` is COLMAP's: which image it took; empty: the only one
   std::optional<double> camera_unit;  ///< mm, of COLMAP's unit of length
   std::string footage, tracks;        ///< paths as given
+  std::string measurements;           ///< path (measurements.h); empty: none
   RenderCase render;
   TrackCase track;
   FitCase fit;

@@ -77,6 +77,7 @@ Case case_of_view(const Case& c, int clip, int view) {
   one.clips.clear();
   one.scene = k.scene, one.scene_settings = k.scene_settings;
   one.truth_scene = k.truth_scene, one.truth_settings = k.truth_settings;
+  one.measurements = k.measurements;
   one.camera = k.views[view].camera, one.footage = k.views[view].footage, one.tracks = k.views[view].tracks;
   return one;
 }

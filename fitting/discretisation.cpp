@@ -86,6 +86,7 @@ void add_change(const FitProblem& clip, const FitEvaluation& at, const FitProble
     }
     row += noise.num_rows();
   }
+  change.segment(row, at.measured.size()) = finer_at.measured - at.measured;
 }
 
 /// The clips of the fit with their scenes replaced.

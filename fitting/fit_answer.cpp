@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "fitting/fit.h"
@@ -76,6 +77,27 @@ std::string clip_table(const FitResult& result) {
   return layout(rows);
 }
 
+/// A line per quantity that was measured besides pixels.
+std::string measured_lines(const FitResult& result) {
+  struct Sum {
+    int count = 0;
+    double squares = 0, whitened = 0;
+  };
+  std::map<std::string, Sum> sums;
+  for (const FittedMeasurement& m : result.measured) {
+    Sum& sum = sums[m.quantity];
+    ++sum.count;
+    sum.squares += (m.value - m.predicted) * (m.value - m.predicted);
+    sum.whitened += std::pow((m.value - m.predicted) / m.sigma, 2);
+  }
+  std::string text;
+  for (const auto& [quantity, sum] : sums)
+    text += quantity + ": " + std::to_string(sum.count) + " values, off by " +
+            number(std::sqrt(sum.squares / sum.count)) + (quantity.starts_with("force_") ? " N" : " mm") +
+            " rms, " + number(std::sqrt(sum.whitened / sum.count)) + " of their deviations.\n";
+  return text;
+}
+
 /// By how much each finer variant would move the parameters: per cent, or the parameter's unit where it is
 /// fitted as it is.
 std::string shift_table(const FitResult& result) {
@@ -128,6 +150,7 @@ std::string answer_text(const FitResult& result) {
           " forward runs; residual " + number(result.rms_px) + " px rms over " +
           std::to_string(result.num_observations) + " observations of " + std::to_string(result.num_tracks) +
           " tracks, reduced chi-square " + number(result.reduced_chi_square) + ".\n";
+  text += measured_lines(result);
   if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";
   if (!result.discretisation.empty()) text += "\n" + shift_table(result);

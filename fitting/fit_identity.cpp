@@ -48,6 +48,18 @@ std::string tracks_digest(const TrackSet& tracks) {
   return d.hex();
 }
 
+std::string measured_digest(const std::vector<Measurement>& measured) {
+  if (measured.empty()) return {};
+  Digest d;
+  for (const Measurement& m : measured) {
+    d.number(m.frame);
+    d.text(m.quantity);
+    d.number(m.value);
+    d.number(m.sigma);
+  }
+  return d.hex();
+}
+
 std::string parameters_digest(const FitCase& fit, const Parametrisation& parametrisation) {
   Digest d;
   for (const FitVariable& v : parametrisation.variables()) {
@@ -62,6 +74,13 @@ std::string parameters_digest(const FitCase& fit, const Parametrisation& paramet
   for (const StillRegion& region : fit.still) {
     d.matrix(region.low);
     d.matrix(region.high);
+  }
+  if (fit.wrinkles) {
+    d.matrix(fit.wrinkles->line.from);
+    d.matrix(fit.wrinkles->line.to);
+    for (const double x :
+         {static_cast<double>(fit.wrinkles->points), fit.wrinkles->band.shortest, fit.wrinkles->band.longest})
+      d.number(x);
   }
   return d.hex();
 }
@@ -78,7 +97,7 @@ FitIdentity fit_identity(const FitClip& clip, const FitCase& options, const FitP
   return {{"program", program_digest()},
           {"scene", scene_digest(clip.scene, problem)},
           {"camera", cameras},
-          {"tracks", tracks_digest(clip.tracks)},
+          {"tracks", tracks_digest(clip.tracks) + measured_digest(clip.measured)},
           {"parameters", parameters_digest(options, problem.parametrisation())}};
 }
 

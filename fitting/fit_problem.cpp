@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "adjoint/output_values.h"
 #include "adjoint/sweeps.h"
 #include "sim/core/error.h"
 #include "sim/core/units.h"
@@ -78,7 +79,7 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& cam
     : FitProblem(scene, fit, std::vector<Camera>{camera}, tracks) {}
 
 FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector<Camera>& cameras,
-                       const TrackSet& tracks)
+                       const TrackSet& tracks, const std::vector<Measurement>& measured)
     : parametrisation_(scene, fit), model_(parametrisation_.scene(parametrisation_.initial())) {
   options_ = model_.run_options();
   options_.frames = last_used_frame(scene, fit);
@@ -91,6 +92,15 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
     attach(scene, fit, cameras[c], static_cast<int>(c), tracks, seen_first);
   require_observations(fit, cameras);
 
+  if (!measured.empty()) measured_.emplace(model_.model(), measured, fit.wrinkles, options_.frames);
+  predict_by(cameras);
+
+  for (const TrackNoise& n : noise_) num_residuals_ += n.num_rows();
+  if (measured_) num_residuals_ += static_cast<int>(measured_->values().size());
+  for (const FitVariable& v : parametrisation_.variables()) num_residuals_ += v.prior_sigma ? 1 : 0;
+}
+
+void FitProblem::predict_by(const std::vector<Camera>& cameras) {
   std::vector<std::vector<int>> points_in_frame(options_.frames + 1);
   output_row_.resize(compared_.size());
   for (std::size_t i = 0; i < compared_.size(); ++i)
@@ -102,17 +112,18 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
     for (std::size_t i = 0; i < compared_.size(); ++i) points_in_frame[0].push_back(static_cast<int>(i));
   std::vector<int> seen_by;
   for (const ComparedTrack& c : compared_) seen_by.push_back(c.camera);
-  prediction_.emplace(model_.model().mesh, points_of(registration_), cameras, std::move(seen_by),
-                      std::move(points_in_frame));
+  prediction_ = std::make_shared<ProjectedPoints>(model_.model().mesh, points_of(registration_), cameras,
+                                                  std::move(seen_by), std::move(points_in_frame));
   for (std::size_t c = 0; c < head_motion_.size(); ++c)
     prediction_->set_poses(static_cast<int>(c), head_motion_[c].cameras);
+  output_ = prediction_;
+  if (measured_)
+    output_ = std::make_shared<adjoint::CombinedOutput>(
+        std::vector<std::shared_ptr<const adjoint::Output>>{prediction_, measured_->output()});
   for (int f = 0; f <= options_.frames; ++f) {
     frame_row_.push_back(num_predicted_);
-    num_predicted_ += prediction_->size(f);
+    num_predicted_ += output_->size(f);
   }
-
-  for (const TrackNoise& n : noise_) num_residuals_ += n.num_rows();
-  for (const FitVariable& v : parametrisation_.variables()) num_residuals_ += v.prior_sigma ? 1 : 0;
 }
 
 void FitProblem::attach(const Scene& scene, const FitCase& fit, const Camera& camera, int number,
@@ -190,6 +201,7 @@ void FitProblem::require_observations(const FitCase& fit, const std::vector<Came
 
 int FitProblem::degrees_of_freedom() const {
   int dof = 2 * num_observations_ - num_parameters();
+  if (measured_) dof += static_cast<int>(measured_->values().size());
   for (const FitVariable& v : parametrisation_.variables()) dof += v.prior_sigma ? 1 : 0;
   return dof;
 }
@@ -255,9 +267,12 @@ EvaluationLog::Record FitProblem::simulate_and_project() {
   EvaluationLog::Record record;
   if (trajectory_->complete) {
     record.values.resize(num_predicted_, 1);
+    const std::vector<VectorXd> values =
+        measured_ ? adjoint::output_values(model_.model(), native_, *trajectory_, *output_)
+                  : std::vector<VectorXd>();
     for (int f = 0; f <= frames(); ++f)
-      record.values.col(0).segment(frame_row_[f], prediction_->size(f)) =
-          prediction_->values(f, trajectory_->at_frame(f));
+      record.values.col(0).segment(frame_row_[f], output_->size(f)) =
+          measured_ ? values[f] : prediction_->values(f, trajectory_->at_frame(f));
   } else {
     record.failure = trajectory_->failure.empty() ? "the run did not complete" : trajectory_->failure;
   }
@@ -300,6 +315,16 @@ void FitProblem::compare(const VectorXd& predicted) {
     row += noise_[i].num_rows();
     evaluation_.differences.push_back(std::move(r));
   }
+  const std::vector<MeasuredQuantities::Value> measured = this->measured();
+  evaluation_.measured.resize(static_cast<Eigen::Index>(measured.size()));
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    const Measurement& m = measured[i].measurement;
+    evaluation_.measured[static_cast<Eigen::Index>(i)] =
+        (m.value - predicted[measured_row(measured[i])]) / m.sigma;
+  }
+  if (!evaluation_.measured.allFinite()) return fail("a measured quantity has no value");
+  evaluation_.residuals.segment(row, evaluation_.measured.size()) = evaluation_.measured;
+  row += evaluation_.measured.size();
   for (int k = 0; k < num_parameters(); ++k)
     if (const auto& prior = parametrisation_.variables()[k].prior_sigma)
       evaluation_.residuals[row++] = (t_[k] - parametrisation_.initial()[k]) / *prior;
@@ -347,10 +372,9 @@ std::optional<std::vector<MatrixXd>> FitProblem::difference_jacobians(const Vect
   if (difference_jacobians_) return difference_jacobians_;
   const auto sweep = [&] {
     const adjoint::TangentResult tangent = adjoint::tangent_sweep(
-        model_.model(), native_, *trajectory_, *prediction_, parametrisation_.native_directions(model_, t));
+        model_.model(), native_, *trajectory_, *output_, parametrisation_.native_directions(model_, t));
     MatrixXd all(num_predicted_, num_parameters());
-    for (int f = 0; f <= frames(); ++f)
-      all.middleRows(frame_row_[f], prediction_->size(f)) = tangent.frames[f];
+    for (int f = 0; f <= frames(); ++f) all.middleRows(frame_row_[f], output_->size(f)) = tangent.frames[f];
     return all;
   };
   const auto tangent =
@@ -367,6 +391,11 @@ std::optional<std::vector<MatrixXd>> FitProblem::difference_jacobians(const Vect
         dr.middleRows<2>(2 * j) += tangent->middleRows<2>(first_prediction(i));
     result.push_back(std::move(dr));
   }
+  const std::vector<MeasuredQuantities::Value> measured = this->measured();
+  measured_jacobian_.resize(static_cast<Eigen::Index>(measured.size()), num_parameters());
+  for (std::size_t i = 0; i < measured.size(); ++i)
+    measured_jacobian_.row(static_cast<Eigen::Index>(i)) =
+        -tangent->row(measured_row(measured[i])) / measured[i].measurement.sigma;
   difference_jacobians_ = std::move(result);
   return difference_jacobians_;
 }
@@ -381,6 +410,8 @@ std::optional<MatrixXd> FitProblem::jacobian(const VectorXd& t) {
         noise_[i].whitened_jacobian(evaluation_.differences[i], evaluation_.tracks[i], (*dr)[i]);
     row += noise_[i].num_rows();
   }
+  out.middleRows(row, measured_jacobian_.rows()) = measured_jacobian_;
+  row += measured_jacobian_.rows();
   for (int k = 0; k < num_parameters(); ++k)
     if (const auto& prior = parametrisation_.variables()[k].prior_sigma) out(row++, k) = 1 / *prior;
   return out;
@@ -398,6 +429,8 @@ std::optional<FitProblem::Linearised> FitProblem::linearised(const VectorXd& t) 
     out.jacobian.middleRows(row, n) = noise_[i].weighted_jacobian(evaluation_.tracks[i], (*dr)[i]);
     row += n;
   }
+  out.jacobian.middleRows(row, measured_jacobian_.rows()) = measured_jacobian_;
+  row += measured_jacobian_.rows();
   for (int k = 0; k < num_parameters(); ++k)
     if (const auto& prior = parametrisation_.variables()[k].prior_sigma) out.jacobian(row++, k) = 1 / *prior;
   return out;
@@ -407,15 +440,21 @@ std::optional<VectorXd> FitProblem::gradient(const VectorXd& t) {
   if (evaluate(t).failed) return std::nullopt;
   const auto sweep = [&]() -> MatrixXd {
     std::vector<VectorXd> weights(frames() + 1);
-    for (int f = 0; f <= frames(); ++f) weights[f] = VectorXd::Zero(prediction_->size(f));
+    for (int f = 0; f <= frames(); ++f) weights[f] = VectorXd::Zero(output_->size(f));
     for (std::size_t i = 0; i < compared_.size(); ++i)
       for (std::size_t j = 0; j < compared_[i].frames.size(); ++j) {
         const Vec2 gradient = evaluation_.tracks[i].gradient.segment<2>(2 * j);
         weights[compared_[i].frames[j]].segment<2>(output_row_[i][j]) = -gradient;
         if (options_.settle) weights[0].segment<2>(first_prediction(i)) += gradient;
       }
+    const std::vector<MeasuredQuantities::Value> measured = this->measured();
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      const Measurement& m = measured[i].measurement;
+      weights[m.frame][prediction_->size(m.frame) + measured[i].row] -=
+          evaluation_.measured[static_cast<Eigen::Index>(i)] / m.sigma;
+    }
     const adjoint::AdjointResult result =
-        adjoint::adjoint_sweep(model_.model(), native_, *trajectory_, *prediction_, weights);
+        adjoint::adjoint_sweep(model_.model(), native_, *trajectory_, *output_, weights);
     return parametrisation_.native_directions(model_, t).transpose() * result.native_bar;
   };
   const auto of_tracks =

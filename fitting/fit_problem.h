@@ -1,8 +1,9 @@
 // The objective of a fit: forward run, projection, whitening; and its derivatives by the tangent or the
 // adjoint sweep of the same run.
 //
-//   F(t) = Σ_tracks cost(observed − predicted(t)) + ½ Σ ((t_k − t_k,initial) / prior_k)²
-//   residuals z with F = ½|z|²;  rows: tracks one after the other, then priors
+//   F(t) = Σ_tracks cost(observed − predicted(t)) + ½ Σ ((measured − predicted(t)) / σ)²
+//          + ½ Σ ((t_k − t_k,initial) / prior_k)²
+//   residuals z with F = ½|z|²;  rows: tracks one after the other, then measurements, then priors
 //
 // The last run is kept: value, Jacobian and gradient at the same t share it. With a log, what it holds is
 // taken from there instead of being computed, and what is computed is added to it. Tests:
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "fitting/evaluation_log.h"
+#include "fitting/measurements.h"
 #include "fitting/objective.h"
 #include "fitting/projected_points.h"
 #include "fitting/registration.h"
@@ -27,6 +29,7 @@ namespace rhytid::fitting {
 struct FitEvaluation : ObjectiveEvaluation {
   std::vector<VectorXd> differences;           ///< per track: observed − predicted [2n], px
   std::vector<TrackNoise::Evaluation> tracks;  ///< per track
+  VectorXd measured;                           ///< (measured − predicted)/σ of the measurements
 };
 
 /// Called after every forward run.
@@ -47,8 +50,9 @@ class FitProblem final : public Objective {
   /// Several cameras saw the same clip: each has the tracks that bear its name, all share a run. Throws
   /// InputError besides when two cameras have one name, a camera has no track that can be compared, or a
   /// track no camera.
+  /// Besides, `measured` values of the same run are compared.
   FitProblem(const Scene& scene, const FitCase& fit, const std::vector<Camera>& cameras,
-             const TrackSet& tracks);
+             const TrackSet& tracks, const std::vector<Measurement>& measured = {});
 
   const Parametrisation& parametrisation() const { return parametrisation_; }
   const std::vector<FitVariable>& variables() const override { return parametrisation_.variables(); }
@@ -88,6 +92,10 @@ class FitProblem final : public Objective {
   std::vector<Vec3> rest_points() const;
   /// How the head moves before each camera; empty where it stands still.
   const std::vector<HeadMotion>& head_motion() const { return head_motion_; }
+  /// Values compared besides pixels; empty where there are none.
+  std::vector<MeasuredQuantities::Value> measured() const {
+    return measured_ ? measured_->values() : std::vector<MeasuredQuantities::Value>();
+  }
   const std::vector<TrackNoise>& noise() const { return noise_; }
 
   struct Counters {
@@ -121,6 +129,13 @@ class FitProblem final : public Objective {
                                      int& count, std::vector<double>& seconds);
   void compare(const VectorXd& predicted);
   void fail(const std::string& why);
+  /// Builds the output that runs are asked for.
+  void predict_by(const std::vector<Camera>& cameras);
+  /// Row of a measured value's prediction among those of all frames.
+  Eigen::Index measured_row(const MeasuredQuantities::Value& value) const {
+    const int frame = value.measurement.frame;
+    return frame_row_[frame] + prediction_->size(frame) + value.row;
+  }
   /// Row of a track's prediction in frame 0; only there when frame 0 is settled.
   Eigen::Index first_prediction(std::size_t compared) const {
     return frame_row_[0] + 2 * static_cast<Eigen::Index>(compared);
@@ -136,7 +151,9 @@ class FitProblem final : public Objective {
   std::vector<HeadMotion> head_motion_;
   std::vector<ComparedTrack> compared_;
   std::vector<TrackNoise> noise_;
-  std::optional<ProjectedPoints> prediction_;
+  std::shared_ptr<ProjectedPoints> prediction_;
+  std::optional<MeasuredQuantities> measured_;
+  std::shared_ptr<const adjoint::Output> output_;  ///< pixels of a frame, then what was measured
   /// Row of (track, observation) in its frame's output, in the order of compared_.
   std::vector<std::vector<int>> output_row_;
   int num_residuals_ = 0, num_observations_ = 0;
@@ -148,8 +165,9 @@ class FitProblem final : public Objective {
   std::optional<Trajectory> trajectory_;  ///< at t_; not there when the run came from the log
   FitEvaluation evaluation_;
   std::optional<std::vector<MatrixXd>> difference_jacobians_;  ///< at t_
-  using Bits = std::vector<double>;                            ///< of t
-  std::set<std::pair<EvaluationLog::Kind, Bits>> counted_;     ///< evaluations so far
+  MatrixXd measured_jacobian_;       ///< ∂(measured − predicted)/σ by t, where the former are
+  using Bits = std::vector<double>;  ///< of t
+  std::set<std::pair<EvaluationLog::Kind, Bits>> counted_;  ///< evaluations so far
   std::set<Bits> without_derivative_;
   std::string last_failure_;
   Counters counters_;

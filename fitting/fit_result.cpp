@@ -71,6 +71,16 @@ void shift_fields(Archive& field, Record& d) {
 }
 
 template <class Archive, class Record>
+void measurement_fields(Archive& field, Record& m) {
+  field("clip", m.clip);
+  field("frame", m.frame);
+  field("quantity", m.quantity);
+  field("value", m.value);
+  field("sigma", m.sigma);
+  field("predicted", m.predicted);
+}
+
+template <class Archive, class Record>
 void view_fields(Archive& field, Record& v) {
   field("camera", v.camera);
   field("num_tracks", v.num_tracks);
@@ -122,6 +132,7 @@ void result_fields(Archive& field, Record& r) {
   field("forward_seconds", r.forward_seconds);
   field("history", r.history);
   field.optional("discretisation", r.discretisation);
+  field.optional("measured", r.measured);
   field("singular_values", r.singular_values);
   field("right_vectors", r.right_vectors);
   field("correlation", r.correlation);
@@ -187,6 +198,11 @@ class Writer {
   static Json json(const DiscretisationShift& v) {
     Writer w;
     shift_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const FittedMeasurement& v) {
+    Writer w;
+    measurement_fields(w, v);
     return std::move(w.out);
   }
   static Json json(const FittedView& v) {
@@ -291,6 +307,10 @@ class Reader {
   static void read(const Json& j, DiscretisationShift& v, const std::string& where) {
     Reader r(j, where);
     shift_fields(r, v);
+  }
+  static void read(const Json& j, FittedMeasurement& v, const std::string& where) {
+    Reader r(j, where);
+    measurement_fields(r, v);
   }
   static void read(const Json& j, FittedView& v, const std::string& where) {
     Reader r(j, where);

@@ -54,6 +54,13 @@ struct FitResidual {
   int clip = 0, view = 0;
 };
 
+/// A value measured besides pixels, against the fitted prediction.
+struct FittedMeasurement {
+  int clip = 0, frame = 0;
+  std::string quantity;  ///< measurements.h, which also says the unit
+  double value = 0, sigma = 0, predicted = 0;
+};
+
 /// What one camera of a clip contributed.
 struct FittedView {
   std::string camera;
@@ -94,6 +101,7 @@ struct FitResult {
   std::vector<std::string> cannot_tell;  ///< sentences: what the footage does not determine
   std::vector<std::string> notes;        ///< schemes, settings, warnings
   std::vector<FitResidual> residuals;
+  std::vector<FittedMeasurement> measured;  ///< empty where nothing was measured besides
   /// Files as found from the folder of results, or absolute. scene_file is what the fit began from.
   std::string scene_file, footage_file, tracks_file, camera_file;
   std::vector<std::string> settings;  ///< changes of the case by --set

@@ -235,6 +235,15 @@ void add_parameters(const JointProblem& problem, const VectorXd& t, const Identi
 }
 
 void add_residuals(const JointFitInput& input, JointProblem& problem, const VectorXd& t, FitResult& result) {
+  for (int c = 0; c < problem.num_clips(); ++c) {
+    const std::vector<MeasuredQuantities::Value> values = problem.clip(c).measured();
+    const FitEvaluation& at = problem.clip(c).evaluate(problem.of_clip(c, t));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const Measurement& m = values[i].measurement;
+      result.measured.push_back({c, m.frame, m.quantity, m.value, m.sigma,
+                                 m.value - m.sigma * at.measured[static_cast<Eigen::Index>(i)]});
+    }
+  }
   double sum = 0;
   for (int c = 0; c < problem.num_clips(); ++c) {
     FittedClip clip;
@@ -286,7 +295,7 @@ void add_notes(const JointFitInput& input, JointProblem& problem, const VectorXd
   result.notes.push_back("Damper scheme: " + to_string(input.clips[0].scene.time.damper) +
                          "; relaxation times and fractions depend on it.");
   for (const std::string& sentence : problem.differences()) result.notes.push_back("Warning: " + sentence);
-  if (problem.gauge_is_free())
+  if (problem.gauge_is_free() && !problem.has_forces())
     result.notes.push_back(
         "Warning: every stiffness is fitted and there are no force data: absolute values are arbitrary, only "
         "ratios are meaningful. Leave one Young's modulus out of the fitted parameters.");

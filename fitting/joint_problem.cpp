@@ -101,7 +101,7 @@ void JointProblem::build_clips(const std::vector<FitClip>& clips, const FitCase&
     FitCase of_clip = fit;
     of_clip.parameters = parameters_[c];
     try {
-      clips_.emplace_back(clips[c].scene, of_clip, clips[c].cameras, clips[c].tracks);
+      clips_.emplace_back(clips[c].scene, of_clip, clips[c].cameras, clips[c].tracks, clips[c].measured);
     } catch (const InputError& error) {
       if (clips.size() == 1) throw;
       throw InputError(label(clips[c]) + ": " + error.what());
@@ -178,7 +178,7 @@ int JointProblem::num_observations() const {
 }
 
 int JointProblem::degrees_of_freedom() const {
-  int dof = 2 * num_observations() - num_parameters();
+  int dof = 2 * num_observations() + num_measured() - num_parameters();
   for (const FitVariable& v : variables_) dof += v.prior_sigma ? 1 : 0;
   return dof;
 }
@@ -190,6 +190,29 @@ bool JointProblem::was_stopped() const {
 bool JointProblem::gauge_is_free() const {
   return std::all_of(clips_.begin(), clips_.end(),
                      [](const FitProblem& p) { return p.parametrisation().gauge_is_free(); });
+}
+
+int JointProblem::num_measured() const {
+  int n = 0;
+  for (const FitProblem& clip : clips_) n += static_cast<int>(clip.measured().size());
+  return n;
+}
+
+bool JointProblem::has_forces() const {
+  for (const FitProblem& clip : clips_)
+    for (const MeasuredQuantities::Value& v : clip.measured())
+      if (v.measurement.quantity.starts_with("force_")) return true;
+  return false;
+}
+
+std::string JointProblem::gauge_sentence() const {
+  if (has_forces() && gauge_is_free())
+    return "Nothing was held: measured forces set the scale of all stiffnesses, with contact penalties that "
+           "follow the "
+           "modulus of layer " +
+           gauge_layer() + ".";
+  const std::string sentence = clips_[0].parametrisation().gauge_sentence();
+  return has_forces() ? sentence + " Measured forces do: every modulus can be fitted." : sentence;
 }
 
 int JointProblem::modulus_variable(const std::string& layer) const {

@@ -28,7 +28,8 @@ struct FitClip {
   std::string files;  ///< where its tracks come from, for messages; may be empty
   Scene scene;
   std::vector<Camera> cameras;
-  TrackSet tracks;  ///< of all cameras, by their names
+  TrackSet tracks;                         ///< of all cameras, by their names
+  std::vector<Measurement> measured = {};  ///< what else was measured in the run
 };
 
 /// "/clips/NAME/..." for a parameter of one clip, the address itself for a shared one.
@@ -67,8 +68,10 @@ class JointProblem final : public Objective {
   std::optional<FitProblem::Linearised> linearised(const VectorXd& t);
 
   const std::string& gauge_layer() const { return clips_[0].parametrisation().gauge_layer(); }
-  std::string gauge_sentence() const { return clips_[0].parametrisation().gauge_sentence(); }
+  std::string gauge_sentence() const;
   bool gauge_is_free() const;  ///< in all clips
+  int num_measured() const;    ///< values besides pixels
+  bool has_forces() const;     ///< among them
   /// The variable that is a layer's Young's modulus in the first clip; −1 = held.
   int modulus_variable(const std::string& layer) const;
   /// Sentences about skin that differs between the clips though nothing of it is fitted per clip.

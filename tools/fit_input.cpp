@@ -161,6 +161,8 @@ std::optional<fitting::JointFitInput> fit_input(const fitting::Case& c, const fi
     fitting::FitClip& clip = input.clips.emplace_back();
     if (!c.clips.empty()) clip.name = c.clips[k].name;
     clip.scene = scenes[k];
+    const std::string& measured = c.clips.empty() ? c.measurements : c.clips[k].measurements;
+    if (!measured.empty()) clip.measured = fitting::read_measurements(measured);
     for (const std::string& warning : scene_warnings(clip.scene))
       context.progress.warning((clip.name.empty() ? "" : "clip " + clip.name + ": ") + warning);
   }

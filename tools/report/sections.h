@@ -22,6 +22,9 @@ VectorXd ligament_deviation(const SceneModel& model, const fitting::FitResult& f
 /// Observed and predicted features over a late frame, and the residual of every frame.
 void add_footage(HtmlPage& page, const ReportData& data);
 
+/// Forces and wrinkles that were measured, against the fitted prediction; nothing where there were none.
+void add_measured(HtmlPage& page, const ReportData& data);
+
 /// The simulated surface beside the footage. `displacement` [num_nodes·3] mm of `frame`.
 void add_surface(HtmlPage& page, const ReportData& data, const VectorXd& displacement, int frame);
 

@@ -70,6 +70,7 @@ ReportOutcome write_report(const std::string& folder, Progress& progress, const 
   add_answer(page, data);
   add_ligaments(page, data);
   add_footage(page, data);
+  add_measured(page, data);
   if (late) add_surface(page, data, late->displacement, late->frame);
   add_convergence(page, data);
   add_identifiability(page, data);

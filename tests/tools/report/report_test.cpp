@@ -88,12 +88,13 @@ TEST(Report, HoldsTheWholeFit) {
   EXPECT_THAT(html,
               HasSubstr("order 4 in the plane instead of 3, which moves the predicted points by 0.11 px"));
   EXPECT_THAT(html, HasSubstr(">+9.4 %<"));  // left strength: exp(0.09)
+  EXPECT_THAT(html, HasSubstr("force_finger_z [N]"));
   EXPECT_THAT(html, HasSubstr("Could not be run: did not converge in frame 3"));
 
-  // Pictures: two maps, shaded skin, height, slide; overlay and frame of the footage; six plots.
+  // Pictures: two maps, shaded skin, height, slide; overlay and frame of the footage; seven plots.
   EXPECT_EQ(count(html, "src=\"data:image/png;base64,"), 5u);
   EXPECT_EQ(count(html, "src=\"data:image/jpeg;base64,"), 2u);
-  EXPECT_EQ(count(html, "<svg"), 6u);
+  EXPECT_EQ(count(html, "<svg"), 7u);
 }
 
 TEST(Report, IsTheSameTwice) {

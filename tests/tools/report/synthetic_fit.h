@@ -78,6 +78,8 @@ inline fitting::FitResult write_synthetic_fit(const std::string& folder, int fra
     for (const auto& p : fit.parameters) step.values.push_back(p.value * std::pow(p.initial / p.value, rest));
     fit.history.push_back(step);
   }
+  fit.measured = {{0, 1, "force_finger_z", -0.11, 0.005, -0.108},
+                  {0, 2, "force_finger_z", -0.14, 0.005, -0.139}};
   fit.discretisation = {
       {"thickness", "layers stacked", "", 0.05, 3.1, {0.01, -0.02, 0.005, 0.001}},
       {"plane", "order 4 in the plane instead of 3", "", 0.11, 5.2, {0.012, 0.09, -0.01, 0.002}},
