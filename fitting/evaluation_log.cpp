@@ -25,6 +25,8 @@ const char* name_of(EvaluationLog::Kind kind) {
       return "run";
     case EvaluationLog::Kind::tangent:
       return "tangent";
+    case EvaluationLog::Kind::points:
+      return "points";
     case EvaluationLog::Kind::adjoint:
       break;
   }
@@ -162,7 +164,7 @@ void EvaluationLog::read_index() {
     const std::optional<Header> header = read_header(content);
     if (!header) continue;
     const std::string t = content.substr(header->data, header->parameters * sizeof(double));
-    for (const Kind kind : {Kind::run, Kind::tangent, Kind::adjoint})
+    for (const Kind kind : {Kind::run, Kind::tangent, Kind::adjoint, Kind::points})
       if (header->kind == name_of(kind)) files_[{kind, t}] = path;
     num_runs_ += header->kind == name_of(Kind::run) ? 1 : 0;
   }

@@ -3,7 +3,7 @@
 // was; the optimiser cannot tell a replayed evaluation from a fresh one, so both end at the same bits.
 //
 //   FOLDER/identity.json   what the evaluations depend on, one digest per part
-//   FOLDER/run-0001.bin, tangent-0001.bin, adjoint-0001.bin, ...
+//   FOLDER/run-0001.bin, tangent-0001.bin, adjoint-0001.bin, points-0001.bin, ...
 //           a line of JSON, then t and the values as doubles in this machine's byte order
 //
 // A file appears whole or not at all. A log of another identity is set aside as FOLDER.old (.old2, …), never
@@ -37,7 +37,7 @@ FitIdentity fit_identity(const FitClip& clip, const FitCase& options, const FitP
 
 class EvaluationLog {
  public:
-  enum class Kind { run, tangent, adjoint };
+  enum class Kind { run, tangent, adjoint, points };
   /// One evaluation; failure is empty or the sentence that says why there are no values.
   struct Record {
     std::string failure;

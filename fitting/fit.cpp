@@ -6,6 +6,7 @@
 #include "fitting/discretisation.h"
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
+#include "fitting/further_views.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
@@ -80,6 +81,8 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Vect
   result.correlation = found.correlation();
   for (std::string& sentence : found.cannot_tell()) result.cannot_tell.push_back(std::move(sentence));
   result.notes.push_back(interval_note(problem, noise, found));
+  result.further_views = further_views(problem, t, *linearised);  // last: it may need a run again
+  if (problem.was_stopped()) stop_here();
 }
 
 /// What the clips' problems have counted.

@@ -98,6 +98,28 @@ std::string measured_lines(const FitResult& result) {
   return text;
 }
 
+/// The view that would help most.
+std::string further_view_line(const FitResult& result) {
+  const FurtherView* best = nullptr;
+  double best_mean = 0;
+  for (const FurtherView& view : result.further_views) {
+    double sum = 0;
+    int count = 0;
+    for (const double ratio : view.ratios)
+      if (ratio > 0) sum += std::log(ratio), ++count;
+    if (count == 0 || (best != nullptr && sum / count >= best_mean)) continue;
+    best = &view, best_mean = sum / count;
+  }
+  if (best == nullptr) return {};
+  std::string list;
+  for (std::size_t k = 0; k < best->ratios.size(); ++k)
+    if (best->ratios[k] > 0)
+      list +=
+          (list.empty() ? "" : ", ") + result.parameters[k].name + " " + number(best->ratios[k]).substr(0, 4);
+  return "Of further views, " + best->name +
+         " would help most: deviations from noise would be so many times what they are: " + list + ".\n";
+}
+
 /// By how much each finer variant would move the parameters: per cent, or the parameter's unit where it is
 /// fitted as it is.
 std::string shift_table(const FitResult& result) {
@@ -154,6 +176,7 @@ std::string answer_text(const FitResult& result) {
   if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";
   if (!result.discretisation.empty()) text += "\n" + shift_table(result);
+  text += further_view_line(result);
   for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";
   return text;
 }

@@ -400,6 +400,28 @@ std::optional<std::vector<MatrixXd>> FitProblem::difference_jacobians(const Vect
   return difference_jacobians_;
 }
 
+std::optional<MatrixXd> FitProblem::point_motion(const VectorXd& t) {
+  if (evaluate(t).failed) return std::nullopt;
+  const auto sweep = [&] {
+    const adjoint::PointPositions points(model_.model().mesh, points_of(registration_), 0);
+    const adjoint::TangentResult tangent = adjoint::tangent_sweep(
+        model_.model(), native_, *trajectory_, points, parametrisation_.native_directions(model_, t));
+    MatrixXd all(3 * num_observations_, 1 + num_parameters());
+    Eigen::Index row = 0;
+    for (std::size_t i = 0; i < compared_.size(); ++i)
+      for (const int f : compared_[i].frames) {
+        const int point = static_cast<int>(i);
+        all.block<3, 1>(row, 0) = points.interpolation().position(point, trajectory_->at_frame(f).u);
+        all.middleRows<3>(row).rightCols(num_parameters()) = tangent.frames[f].middleRows<3>(3 * point);
+        row += 3;
+      }
+    return all;
+  };
+  int count = 0;  // of what nobody asks
+  std::vector<double> seconds;
+  return derivative(EvaluationLog::Kind::points, sweep, count, seconds);
+}
+
 std::optional<MatrixXd> FitProblem::jacobian(const VectorXd& t) {
   const auto dr = difference_jacobians(t);
   if (!dr) return std::nullopt;

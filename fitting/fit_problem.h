@@ -78,6 +78,10 @@ class FitProblem final : public Objective {
   };
   std::optional<Linearised> linearised(const VectorXd& t);
 
+  /// Positions and their derivatives, [3·observations][1 + parameters] mm, of the compared points in the frames
+  /// that are compared, track after track: X, then ∂X/∂t. Nothing when the run cannot be differentiated.
+  std::optional<MatrixXd> point_motion(const VectorXd& t);
+
   /// Compared observations of a track in the order of its differences.
   struct ComparedTrack {
     int track;       ///< index into the TrackSet

@@ -71,6 +71,12 @@ void shift_fields(Archive& field, Record& d) {
 }
 
 template <class Archive, class Record>
+void further_fields(Archive& field, Record& v) {
+  field("name", v.name);
+  field("ratios", v.ratios);
+}
+
+template <class Archive, class Record>
 void measurement_fields(Archive& field, Record& m) {
   field("clip", m.clip);
   field("frame", m.frame);
@@ -132,6 +138,7 @@ void result_fields(Archive& field, Record& r) {
   field("forward_seconds", r.forward_seconds);
   field("history", r.history);
   field.optional("discretisation", r.discretisation);
+  field.optional("further_views", r.further_views);
   field.optional("measured", r.measured);
   field("singular_values", r.singular_values);
   field("right_vectors", r.right_vectors);
@@ -198,6 +205,11 @@ class Writer {
   static Json json(const DiscretisationShift& v) {
     Writer w;
     shift_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const FurtherView& v) {
+    Writer w;
+    further_fields(w, v);
     return std::move(w.out);
   }
   static Json json(const FittedMeasurement& v) {
@@ -308,6 +320,10 @@ class Reader {
     Reader r(j, where);
     shift_fields(r, v);
   }
+  static void read(const Json& j, FurtherView& v, const std::string& where) {
+    Reader r(j, where);
+    further_fields(r, v);
+  }
   static void read(const Json& j, FittedMeasurement& v, const std::string& where) {
     Reader r(j, where);
     measurement_fields(r, v);
@@ -342,6 +358,9 @@ void check_sizes(const FitResult& result, const std::string& where) {
   check("right_vectors", result.right_vectors.rows(), result.right_vectors.cols(), n);
   check("correlation", result.correlation.rows(), result.correlation.cols(), n);
   if (result.singular_values.size() > 0) check("singular_values", result.singular_values.size(), 1, 1);
+  for (size_t i = 0; i < result.further_views.size(); ++i)
+    check(("further_views/" + std::to_string(i) + "/ratios").c_str(),
+          static_cast<Eigen::Index>(result.further_views[i].ratios.size()), 1, 1);
   for (size_t i = 0; i < result.discretisation.size(); ++i) {
     const auto size = static_cast<Eigen::Index>(result.discretisation[i].shift.size());
     if (size > 0) check(("discretisation/" + std::to_string(i) + "/shift").c_str(), size, 1, 1);

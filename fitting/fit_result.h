@@ -39,6 +39,14 @@ struct DiscretisationShift {
   std::vector<double> shift;  ///< [parameters] of the transformed parameters; empty when it was not run
 };
 
+/// A view that was not filmed, and what it would do to the deviations (further_views.h).
+struct FurtherView {
+  std::string name;  ///< in words: "another camera 45° to the left"
+  /// [parameters] deviation from noise with it per deviation without; NaN where the footage leaves a
+  /// parameter open.
+  std::vector<double> ratios;
+};
+
 struct FitIteration {
   int iteration = 0, evaluations = 0;
   double cost = 0, gradient_norm = 0, step_norm = 0, seconds = 0;
@@ -101,6 +109,7 @@ struct FitResult {
   std::vector<std::string> cannot_tell;  ///< sentences: what the footage does not determine
   std::vector<std::string> notes;        ///< schemes, settings, warnings
   std::vector<FitResidual> residuals;
+  std::vector<FurtherView> further_views;
   std::vector<FittedMeasurement> measured;  ///< empty where nothing was measured besides
   /// Files as found from the folder of results, or absolute. scene_file is what the fit began from.
   std::string scene_file, footage_file, tracks_file, camera_file;

@@ -41,6 +41,7 @@ FitResult example() {
   r.gauge = "held";
   r.initial_cost = 1e5 / 7;
   r.num_observations = 12345;
+  r.further_views = {{"up", {0.5, nan_value}}};
   r.measured = {{1, 3, "force_finger_x", 0.25, 1. / 3, 0.3}};
   r.discretisation = {{"plane", "order 4", "", 0.25, 1.5, {0.1, -1. / 3}},
                       {"steps", "finer", "no end", 0, 2, {}}};
@@ -84,6 +85,9 @@ TEST(FitResult, ReadsBackBitForBit) {
   EXPECT_TRUE(std::isnan(*s.derived[1].truth));
   EXPECT_EQ(s.initial_cost, r.initial_cost);
   EXPECT_EQ(s.num_observations, 12345);
+  ASSERT_EQ(s.further_views.size(), 1u);
+  EXPECT_EQ(s.further_views[0].ratios[0], 0.5);
+  EXPECT_TRUE(std::isnan(s.further_views[0].ratios[1]));
   ASSERT_EQ(s.measured.size(), 1u);
   EXPECT_EQ(s.measured[0].quantity, "force_finger_x");
   EXPECT_EQ(s.measured[0].sigma, 1. / 3);

@@ -151,6 +151,33 @@ void add_weakest(HtmlPage& page, const FitResult& fit) {
   page.table(table);
 }
 
+void add_further_views(HtmlPage& page, const FitResult& fit) {
+  if (fit.further_views.empty()) return;
+  page.heading("What would help");
+  page.paragraph(
+      "Predicted before it is filmed: the standard deviations from noise with one more view of the same "
+      "swipe, "
+      "as multiples of what they are. What the discretisation does to an answer no view makes smaller. Which "
+      "other "
+      "swipe would tell most, rhytid study design predicts for a list of them.");
+  HtmlTable table;
+  table.caption = "Deviations with a further view, per deviation now.";
+  table.header = {"view"};
+  for (const FittedParameter& p : fit.parameters) table.header.push_back(p.name);
+  for (const fitting::FurtherView& view : fit.further_views) {
+    std::vector<TableCell> row = {view.name};
+    for (const double ratio : view.ratios) {
+      if (std::isnan(ratio)) {
+        row.emplace_back("–");
+      } else {
+        row.emplace_back(fixed_text(ratio, 2), map_colour(ColourMap::sequential, 1 - ratio));
+      }
+    }
+    table.rows.push_back(std::move(row));
+  }
+  page.table(table);
+}
+
 }  // namespace
 
 void add_identifiability(HtmlPage& page, const ReportData& data) {
@@ -166,6 +193,7 @@ void add_identifiability(HtmlPage& page, const ReportData& data) {
   page.end_row();
   if (fit.correlation.rows() > 1) page.paragraph(strongest_pair(fit));
   if (fit.right_vectors.size() > 0 && fit.parameters.size() > 1) add_weakest(page, fit);
+  add_further_views(page, fit);
 }
 
 }  // namespace rhytid::tools

@@ -78,6 +78,8 @@ inline fitting::FitResult write_synthetic_fit(const std::string& folder, int fra
     for (const auto& p : fit.parameters) step.values.push_back(p.value * std::pow(p.initial / p.value, rest));
     fit.history.push_back(step);
   }
+  fit.further_views = {{"the same once more", {0.71, 0.71, 0.71, 0.71}},
+                       {"another camera 45° up", {0.62, std::nan(""), 0.4, 0.9}}};
   fit.measured = {{0, 1, "force_finger_z", -0.11, 0.005, -0.108},
                   {0, 2, "force_finger_z", -0.14, 0.005, -0.139}};
   fit.discretisation = {
