@@ -249,6 +249,21 @@ void read_clips(const LocatedJson& located, Case& c) {
   }
 }
 
+/// Held parameters that the case says how well they are known.
+void read_considered(const LocatedJson& located, const std::vector<Scene>& scenes, Case& c) {
+  if (!located.json["fit"].contains("consider")) return;
+  c.fit.consider.emplace();
+  const json& list = located.json["fit"]["consider"];
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string pointer = "/fit/consider/" + std::to_string(i) + "/address";
+    for (FitParameter named :
+         parameters_named(c, scenes, list[i]["address"], located.where(pointer) + ": " + pointer)) {
+      named.prior_sigma = list[i]["sigma"].get<double>();
+      c.fit.consider->push_back(std::move(named));
+    }
+  }
+}
+
 void read_parameters(const LocatedJson& located, const std::vector<Scene>& scenes, Case& c) {
   const json& list = located.json["fit"]["parameters"];
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -319,6 +334,7 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
   if (c.name.empty())
     c.name = scenes[0].name.empty() || !c.clips.empty() ? fs::path(path).stem().string() : scenes[0].name;
   read_parameters(located, scenes, c);
+  read_considered(located, scenes, c);
   for (const Scene& scene : scenes) check_gauge_layer(located, scene, c.fit.gauge_layer);
   return c;
 }

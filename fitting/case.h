@@ -76,6 +76,9 @@ struct FitCase {
   std::optional<WrinkleLine> wrinkles;  ///< where measured wrinkles are
   /// Whether what the discretisation does to the answer is estimated, and enters the intervals.
   bool discretisation_check = true;
+  /// Held parameters whose error enters the intervals (consider.h), σ_h in prior_sigma. Nothing given: the friction
+  /// coefficients that are not fitted.
+  std::optional<std::vector<FitParameter>> consider;
   /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden
   /// yardstick.
   std::string gauge_layer;  ///< layer whose modulus is fixed; default: the innermost

@@ -346,6 +346,23 @@ std::vector<Rule> fit_rules() {
        .dimension = dimension::length,
        .is_required = true,
        .doc = "Its corner with the largest coordinates."},
+      {.pointer = "/fit/consider",
+       .type = RuleType::array,
+       .doc = "Parameters that are held though they are not known exactly: what their error would move "
+              "enters the "
+              "intervals. Default: friction coefficients that are not fitted, to a factor 1.35. []: none."},
+      {.pointer = "/fit/consider/*", .type = RuleType::object, .doc = "One of them."},
+      {.pointer = "/fit/consider/*/address",
+       .type = RuleType::string,
+       .is_required = true,
+       .doc = "As that of a fitted parameter; one that is fitted is passed over."},
+      {.pointer = "/fit/consider/*/sigma",
+       .is_required = true,
+       .min = 0,
+       .min_is_open = true,
+       .doc = "Its standard deviation, in the transformed value: of a logarithm for moduli, strengths, "
+              "friction; mm "
+              "for knots of a path."},
       {.pointer = "/fit/discretisation_check",
        .type = RuleType::boolean,
        .fallback = c.discretisation_check,

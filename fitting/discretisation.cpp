@@ -116,15 +116,15 @@ std::vector<FinerScene> finer_scenes(const Scene& scene) {
   return {finer_thickness(scene), finer_plane(scene), finer_steps(scene)};
 }
 
-std::vector<DiscretisationShift> discretisation_shifts(const JointFitInput& input, JointProblem& problem,
-                                                       const VectorXd& t,
-                                                       const FitProblem::Linearised& linearised,
-                                                       const MatrixXd& basis, const FitObserver& observer) {
-  std::vector<DiscretisationShift> shifts;
+std::vector<SystematicShift> discretisation_shifts(const JointFitInput& input, JointProblem& problem,
+                                                   const VectorXd& t,
+                                                   const FitProblem::Linearised& linearised,
+                                                   const MatrixXd& basis, const FitObserver& observer) {
+  std::vector<SystematicShift> shifts;
   for (const FinerFit& fit : finer_fits(input)) {
     if (observer.should_stop && observer.should_stop()) return {};
     if (observer.note) observer.note("discretisation: " + fit.change);
-    DiscretisationShift& found = shifts.emplace_back();
+    SystematicShift& found = shifts.emplace_back();
     found.name = fit.name, found.change = fit.change;
     const auto start = std::chrono::steady_clock::now();
     try {

@@ -32,9 +32,9 @@ std::vector<FinerScene> finer_scenes(const Scene& scene);
 /// One forward run per clip and variant at `t`, where the problem was last evaluated, with the linearisation
 /// there; `basis` P has P Pᵀ = (JᵀJ)⁺. A variant that cannot be run says so in `failure`; nothing when
 /// the observer stops it. Runs are kept in, and taken from, the log of evaluations like the fit's own.
-std::vector<DiscretisationShift> discretisation_shifts(const JointFitInput& input, JointProblem& problem,
-                                                       const VectorXd& t,
-                                                       const FitProblem::Linearised& linearised,
-                                                       const MatrixXd& basis, const FitObserver& observer);
+std::vector<SystematicShift> discretisation_shifts(const JointFitInput& input, JointProblem& problem,
+                                                   const VectorXd& t,
+                                                   const FitProblem::Linearised& linearised,
+                                                   const MatrixXd& basis, const FitObserver& observer);
 
 }  // namespace rhytid::fitting

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "fitting/consider.h"
 #include "fitting/discretisation.h"
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
@@ -67,15 +68,21 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Vect
   Identifiability found(linearised->jacobian, problem.variables(), noise.widening,
                         problem.degrees_of_freedom(), whitened_tracks(problem, *linearised));
   if (input.options.discretisation_check) {
-    result.discretisation = discretisation_shifts(input, problem, t, *linearised, found.basis(), observer);
-    for (const DiscretisationShift& d : result.discretisation)
-      if (d.failure.empty()) found.add_systematic(d.shift);
-    if (result.discretisation.empty()) stop_here();
+    result.systematic = discretisation_shifts(input, problem, t, *linearised, found.basis(), observer);
+    if (result.systematic.empty()) stop_here();
   }
+  if (!considered_parameters(input).empty()) {
+    const std::vector<SystematicShift> held =
+        considered_shifts(input, problem, t, *linearised, found.basis(), observer);
+    if (held.empty()) stop_here();
+    result.systematic.insert(result.systematic.end(), held.begin(), held.end());
+  }
+  for (const SystematicShift& shift : result.systematic)
+    if (shift.failure.empty()) found.add_systematic(shift.shift);
   add_parameters(problem, t, &found, truth, result);
   add_modulus_ratios(problem, found, t, truth, result);
   add_clip_chi_squares(problem, *linearised, found, result);
-  add_discretisation_notes(result);
+  add_systematic_notes(input.options, result);
   result.singular_values = found.singular_values();
   result.right_vectors = found.right_vectors();
   result.correlation = found.correlation();

@@ -120,12 +120,12 @@ std::string further_view_line(const FitResult& result) {
          " would help most: deviations from noise would be so many times what they are: " + list + ".\n";
 }
 
-/// By how much each finer variant would move the parameters: per cent, or the parameter's unit where it is
+/// By how much finer variants and errors of held parameters would move the parameters: per cent, or the parameter's unit where it is
 /// fitted as it is.
 std::string shift_table(const FitResult& result) {
   std::vector<Row> rows = {{"would move by", "unit"}};
   std::string text;
-  for (const DiscretisationShift& d : result.discretisation) {
+  for (const SystematicShift& d : result.systematic) {
     if (d.failure.empty())
       rows[0].push_back(d.name);
     else
@@ -136,7 +136,7 @@ std::string shift_table(const FitResult& result) {
     const FittedParameter& p = result.parameters[k];
     const bool is_log = p.transform == "log";
     Row row = {p.name, is_log ? "%" : p.transform == "none" ? p.unit : "logit"};
-    for (const DiscretisationShift& d : result.discretisation)
+    for (const SystematicShift& d : result.systematic)
       if (d.failure.empty()) {
         char moved[32] = "-";  // of what is not determined there is nothing to move
         const double value = is_log ? 100 * std::expm1(d.shift[k]) : d.shift[k];
@@ -147,9 +147,10 @@ std::string shift_table(const FitResult& result) {
     rows.push_back(std::move(row));
   }
   text += layout(rows);
-  for (const DiscretisationShift& d : result.discretisation)
+  for (const SystematicShift& d : result.systematic)
     if (d.failure.empty())
-      text += d.name + ": " + d.change + " (moves the points by " + number(d.rms_px) + " px)\n";
+      text += d.name + ": " + d.change +
+              (d.rms_px > 0 ? " (moves the points by " + number(d.rms_px) + " px)\n" : "\n");
   return text;
 }
 
@@ -175,7 +176,7 @@ std::string answer_text(const FitResult& result) {
   text += measured_lines(result);
   if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";
-  if (!result.discretisation.empty()) text += "\n" + shift_table(result);
+  if (!result.systematic.empty()) text += "\n" + shift_table(result);
   text += further_view_line(result);
   for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";
   return text;

@@ -137,7 +137,7 @@ void result_fields(Archive& field, Record& r) {
   field("seconds", r.seconds);
   field("forward_seconds", r.forward_seconds);
   field("history", r.history);
-  field.optional("discretisation", r.discretisation);
+  field.optional("systematic", r.systematic);
   field.optional("further_views", r.further_views);
   field.optional("measured", r.measured);
   field("singular_values", r.singular_values);
@@ -202,7 +202,7 @@ class Writer {
     iteration_fields(w, v);
     return std::move(w.out);
   }
-  static Json json(const DiscretisationShift& v) {
+  static Json json(const SystematicShift& v) {
     Writer w;
     shift_fields(w, v);
     return std::move(w.out);
@@ -316,7 +316,7 @@ class Reader {
     Reader r(j, where);
     iteration_fields(r, v);
   }
-  static void read(const Json& j, DiscretisationShift& v, const std::string& where) {
+  static void read(const Json& j, SystematicShift& v, const std::string& where) {
     Reader r(j, where);
     shift_fields(r, v);
   }
@@ -361,9 +361,9 @@ void check_sizes(const FitResult& result, const std::string& where) {
   for (size_t i = 0; i < result.further_views.size(); ++i)
     check(("further_views/" + std::to_string(i) + "/ratios").c_str(),
           static_cast<Eigen::Index>(result.further_views[i].ratios.size()), 1, 1);
-  for (size_t i = 0; i < result.discretisation.size(); ++i) {
-    const auto size = static_cast<Eigen::Index>(result.discretisation[i].shift.size());
-    if (size > 0) check(("discretisation/" + std::to_string(i) + "/shift").c_str(), size, 1, 1);
+  for (size_t i = 0; i < result.systematic.size(); ++i) {
+    const auto size = static_cast<Eigen::Index>(result.systematic[i].shift.size());
+    if (size > 0) check(("systematic/" + std::to_string(i) + "/shift").c_str(), size, 1, 1);
   }
   for (size_t i = 0; i < result.history.size(); ++i) {
     const auto size = static_cast<Eigen::Index>(result.history[i].values.size());

@@ -29,14 +29,16 @@ struct DerivedQuantity {
   std::optional<double> truth;
 };
 
-/// By how much the answer would move with one kind of step of the discretisation finer (discretisation.h).
-struct DiscretisationShift {
-  std::string name;           ///< thickness | plane | steps
-  std::string change;         ///< what was made finer, in words
+/// By how much the answer would move with one kind of step of the discretisation finer (discretisation.h), or
+/// with a held parameter off by its deviation (consider.h).
+struct SystematicShift {
+  std::string name;           ///< thickness | plane | steps | held NAME
+  std::string change;         ///< what was changed, in words
   std::string failure;        ///< why it could not be run; empty when it was
-  double rms_px = 0;          ///< by which predictions moved, over all observations
+  double rms_px = 0;          ///< by which predictions moved, over all observations; 0 where not looked at
   double seconds = 0;         ///< that it took
   std::vector<double> shift;  ///< [parameters] of the transformed parameters; empty when it was not run
+  bool is_held() const { return name.starts_with("held"); }
 };
 
 /// A view that was not filmed, and what it would do to the deviations (further_views.h).
@@ -102,7 +104,7 @@ struct FitResult {
   int forward_runs = 0, jacobian_runs = 0;
   double seconds = 0, forward_seconds = 0;  ///< whole fit; median forward run
   std::vector<FitIteration> history;
-  std::vector<DiscretisationShift> discretisation;  ///< empty when it was not asked for
+  std::vector<SystematicShift> systematic;  ///< finer steps, then held parameters
   VectorXd singular_values;              ///< of the whitened Jacobian by transformed parameters, descending
   MatrixXd right_vectors;                ///< [parameters][parameters] columns belong to singular_values
   MatrixXd correlation;                  ///< [parameters][parameters] of the covariance that sigma is from

@@ -312,31 +312,38 @@ std::string interval_note(const JointProblem& problem, const NoiseCheck& noise,
          which_are_wider(found, problem.variables()) + ").";
 }
 
-void add_discretisation_notes(FitResult& result) {
-  if (result.discretisation.empty()) {
+void add_systematic_notes(const FitCase& options, FitResult& result) {
+  if (!options.discretisation_check)
     result.notes.push_back(
         "What the discretisation does to the answer was not checked (/fit/discretisation_check): intervals "
-        "take "
-        "the elements and steps for exact.");
-    return;
-  }
+        "take the elements and steps for exact.");
+  if (result.systematic.empty()) return;
   result.notes.push_back(
-      "Discretisation: the tracks were predicted again with each kind of step finer; by what that would move "
-      "a "
-      "parameter, to first order, its interval is wider, 1.96 times each, in squares.");
+      "Systematic: the tracks were predicted again with each kind of step finer, and differentiated by "
+      "parameters that "
+      "are held but not known exactly; by what that would move a parameter, to first order, its interval is "
+      "wider, 1.96 "
+      "times each, in squares.");
   for (std::size_t k = 0; k < result.parameters.size(); ++k) {
     const FittedParameter& p = result.parameters[k];
-    const DiscretisationShift* largest = nullptr;
-    double squares = 0;
-    for (const DiscretisationShift& d : result.discretisation) {
-      if (!d.failure.empty()) continue;
-      squares += d.shift[k] * d.shift[k];
-      if (largest == nullptr || std::fabs(d.shift[k]) > std::fabs(largest->shift[k])) largest = &d;
+    const SystematicShift* largest = nullptr;
+    double finer = 0;
+    for (const SystematicShift& shift : result.systematic) {
+      if (!shift.failure.empty()) continue;
+      if (shift.is_held()) {
+        if (shift.shift[k] * shift.shift[k] > 0.5 * p.sigma * p.sigma)
+          result.cannot_tell.push_back(p.name + " hangs on a parameter that is held, " +
+                                       shift.name.substr(5) +
+                                       ": the table says what it moves. Fit it too, or measure it.");
+        continue;
+      }
+      finer += shift.shift[k] * shift.shift[k];
+      if (largest == nullptr || std::fabs(shift.shift[k]) > std::fabs(largest->shift[k])) largest = &shift;
     }
-    if (largest == nullptr || !(squares > 0.5 * p.sigma * p.sigma)) continue;
-    result.cannot_tell.push_back("The discretisation, not the footage, limits " + p.name +
-                                 ", most of all this: " + largest->change +
-                                 " would move it as the table says.");
+    if (largest != nullptr && finer > 0.5 * p.sigma * p.sigma)
+      result.cannot_tell.push_back("The discretisation, not the footage, limits " + p.name +
+                                   ", most of all this: " + largest->change +
+                                   " would move it as the table says.");
   }
 }
 

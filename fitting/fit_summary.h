@@ -48,8 +48,8 @@ void add_notes(const JointFitInput& input, JointProblem& problem, const VectorXd
                FitResult& result);
 /// How the intervals came about.
 std::string interval_note(const JointProblem& problem, const NoiseCheck& noise, const Identifiability& found);
-/// Where the shifts of `result.discretisation` make more of a parameter's variance than all else, a sentence
-/// in `cannot_tell`; and a note on what they are.
-void add_discretisation_notes(FitResult& result);
+/// Where a shift of `result.systematic` makes more of a parameter's variance than all else, a sentence in
+/// `cannot_tell`; and notes on what they are.
+void add_systematic_notes(const FitCase& options, FitResult& result);
 
 }  // namespace rhytid::fitting

@@ -72,11 +72,11 @@ TEST(Discretisation, ShiftsAreWhatFinerFitsFind) {
   const FitResult coarse = run_fit(input);
   std::printf("%s", answer_text(coarse).c_str());
   ASSERT_TRUE(coarse.converged);
-  ASSERT_EQ(coarse.discretisation.size(), 3u);
+  ASSERT_EQ(coarse.systematic.size(), 3u);
   const std::vector<FinerScene> finer = finer_scenes(input.scene);
   VectorXd squares = VectorXd::Zero(2);
   for (std::size_t r = 0; r < finer.size(); ++r) {
-    const DiscretisationShift& predicted = coarse.discretisation[r];
+    const SystematicShift& predicted = coarse.systematic[r];
     ASSERT_EQ(predicted.failure, "");
     FitInput again = input;
     again.scene = finer[r].scene;
@@ -94,7 +94,7 @@ TEST(Discretisation, ShiftsAreWhatFinerFitsFind) {
   // The rest of the variance is what a fit without the check reports.
   input.options.discretisation_check = false;
   const FitResult without = run_fit(input);
-  EXPECT_TRUE(without.discretisation.empty());
+  EXPECT_TRUE(without.systematic.empty());
   for (int k = 0; k < 2; ++k) {
     const double noise = without.parameters[k].sigma, all = coarse.parameters[k].sigma;
     EXPECT_NEAR(all * all, noise * noise + squares[k], 1e-9 * all * all);
@@ -119,11 +119,11 @@ TEST(Discretisation, RunsAreKeptAndAStopIsAStop) {
   EXPECT_FALSE(stopped.converged);
 
   const FitResult first = run_fit(input), again = run_fit(input);
-  ASSERT_EQ(first.discretisation.size(), 3u);
+  ASSERT_EQ(first.systematic.size(), 3u);
   for (std::size_t r = 0; r < 3; ++r) {
-    EXPECT_TRUE(fs::exists(fs::path(folder) / ("finer_" + first.discretisation[r].name) / "identity.json"));
-    EXPECT_EQ(first.discretisation[r].shift, again.discretisation[r].shift) << "to the last bit";
-    EXPECT_LT(again.discretisation[r].seconds, 0.5 * first.discretisation[r].seconds + 0.05);
+    EXPECT_TRUE(fs::exists(fs::path(folder) / ("finer_" + first.systematic[r].name) / "identity.json"));
+    EXPECT_EQ(first.systematic[r].shift, again.systematic[r].shift) << "to the last bit";
+    EXPECT_LT(again.systematic[r].seconds, 0.5 * first.systematic[r].seconds + 0.05);
   }
   for (std::size_t k = 0; k < 2; ++k) EXPECT_EQ(first.parameters[k].low95, again.parameters[k].low95);
   fs::remove_all(folder);

@@ -18,6 +18,7 @@ FitInput make_input(double start) {
   const Camera camera = test::make_camera();
   FitCase fit;
   fit.discretisation_check = false;
+  fit.consider.emplace();
   fit.min_sigma = 0.005;
   fit.parameters = {test::fitted(kStretch, start),
                     test::fitted("/colliders/finger/friction/coefficient", 0.5)};

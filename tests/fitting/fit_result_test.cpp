@@ -43,7 +43,7 @@ FitResult example() {
   r.num_observations = 12345;
   r.further_views = {{"up", {0.5, nan_value}}};
   r.measured = {{1, 3, "force_finger_x", 0.25, 1. / 3, 0.3}};
-  r.discretisation = {{"plane", "order 4", "", 0.25, 1.5, {0.1, -1. / 3}},
+  r.systematic = {{"plane", "order 4", "", 0.25, 1.5, {0.1, -1. / 3}},
                       {"steps", "finer", "no end", 0, 2, {}}};
   r.history = {{0, 1, 10, 1, 0, 0.5, {1, 2}}, {1, 3, 1. / 7, 1e-3, 0.2, 1.5, {1.1, nan_value}}};
   r.singular_values = VectorXd::LinSpaced(2, 3.3, 0.1);
@@ -91,11 +91,11 @@ TEST(FitResult, ReadsBackBitForBit) {
   ASSERT_EQ(s.measured.size(), 1u);
   EXPECT_EQ(s.measured[0].quantity, "force_finger_x");
   EXPECT_EQ(s.measured[0].sigma, 1. / 3);
-  ASSERT_EQ(s.discretisation.size(), 2u);
-  EXPECT_EQ(s.discretisation[0].shift, r.discretisation[0].shift);
-  EXPECT_EQ(s.discretisation[0].change, "order 4");
-  EXPECT_EQ(s.discretisation[1].failure, "no end");
-  EXPECT_TRUE(s.discretisation[1].shift.empty());
+  ASSERT_EQ(s.systematic.size(), 2u);
+  EXPECT_EQ(s.systematic[0].shift, r.systematic[0].shift);
+  EXPECT_EQ(s.systematic[0].change, "order 4");
+  EXPECT_EQ(s.systematic[1].failure, "no end");
+  EXPECT_TRUE(s.systematic[1].shift.empty());
   EXPECT_EQ(s.history[1].cost, 1. / 7);
   EXPECT_TRUE(std::isnan(s.history[1].values[1]));
   EXPECT_EQ(s.singular_values, r.singular_values);

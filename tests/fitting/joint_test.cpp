@@ -59,6 +59,7 @@ FitClip make_clip(bool is_second) {
 FitCase two_shared() {
   FitCase fit;
   fit.discretisation_check = false;
+  fit.consider.emplace();
   fit.min_sigma = 0.005;
   fit.parameters = {test::fitted("/skin/layers/film/youngs_modulus", 0.5),
                     test::fitted("/ligaments/stiffness", 0.001)};

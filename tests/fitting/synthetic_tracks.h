@@ -93,6 +93,7 @@ inline FitCase three_parameters() {
   FitCase fit;
   fit.min_sigma = 0.005;
   fit.discretisation_check = false;
+  fit.consider.emplace();
   fit.parameters = {fitted("/ligaments/sources/right/strength", 1.5),
                     fitted("/skin/layers/film/youngs_modulus", 0.5),
                     fitted("/colliders/finger/friction/coefficient", 0.6)};

@@ -16,6 +16,7 @@ TEST(ImportedTracks, AFitFindsTheSameNumbers) {
   const Camera camera = test::make_camera();
   FitCase fit;
   fit.discretisation_check = false;
+  fit.consider.emplace();
   fit.min_sigma = 0.005;
   fit.parameters = {test::fitted("/skin/layers/film/youngs_modulus", 0.7)};
   FitInput input{scene, camera, test::make_tracks(scene, camera, 2, 0.02, 1), fit, {}};

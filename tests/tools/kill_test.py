@@ -7,7 +7,7 @@ Each moment takes one of the jobs in turn, starts it in a folder of its own, and
 takes sends SIGKILL or (every fourth) SIGINT, up to three times; SIGINT must end it with exit code 4. The last start is
 left alone. Then all files must be there with the same bits as in the undisturbed folder, and no temporary ones; but for
 what measures the machine and not the skin:
-  fit.json            seconds, forward_seconds, history/*/seconds, discretisation/*/seconds
+  fit.json            seconds, forward_seconds, history/*/seconds, systematic/*/seconds
   run.json            /timings_s, /resident_MB, /progress/resumed_from_frame and when it began: a resumed run says that it is one;
                       /work, which counts what the last start did, as /timings_s tells how long that took (steps.csv has
                       the work of all steps and is compared)

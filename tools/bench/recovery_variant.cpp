@@ -77,6 +77,7 @@ bool halve_steps(const Scene& fit, VariedCase& varied) {
 bool same_discretisation(const Scene& fit, const Scene& truth, VariedCase& varied) {
   fitting::Case& c = varied.c;
   c.fit.discretisation_check = false;  // it has no error
+  c.fit.consider.emplace();            // nor has what is held
   c.truth_scene = c.scene, c.truth_settings = c.scene_settings;
   const std::vector<ParameterSpec> known = all_parameters(truth);
   for (const ParameterSpec& spec : all_parameters(fit)) {

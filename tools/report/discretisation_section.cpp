@@ -8,14 +8,14 @@
 namespace rhytid::tools {
 namespace {
 
-using fitting::DiscretisationShift;
 using fitting::FitResult;
 using fitting::FittedParameter;
+using fitting::SystematicShift;
 
 /// The part of a parameter's deviation that the shifts do not make.
 double rest_of_deviation(const FitResult& fit, std::size_t k) {
   double squares = fit.parameters[k].sigma * fit.parameters[k].sigma;
-  for (const DiscretisationShift& d : fit.discretisation)
+  for (const SystematicShift& d : fit.systematic)
     if (d.failure.empty()) squares -= d.shift[k] * d.shift[k];
   return std::sqrt(std::max(0.0, squares));
 }
@@ -30,39 +30,39 @@ std::string moved(const FittedParameter& p, double shift) {
   return signed_text(shift, 3) + (p.transform == "none" ? " " + p.unit : "");
 }
 
-void add_bars(HtmlPage& page, const FitResult& fit, const std::vector<const DiscretisationShift*>& run) {
+void add_bars(HtmlPage& page, const FitResult& fit, const std::vector<const SystematicShift*>& run) {
   BarChart chart;
   chart.width = 640;
   chart.height = 320;
   chart.y.label = "shift / deviation from noise and misfit";
   std::string alt = "Shifts in units of the deviation from noise and misfit: ";
-  for (const DiscretisationShift* d : run) chart.series.push_back(d->name);
+  for (const SystematicShift* d : run) chart.series.push_back(d->name);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
     const double deviation = rest_of_deviation(fit, k);
     if (!fit.parameters[k].determined || !(deviation > 0)) continue;
     BarGroup& group = chart.groups.emplace_back();
     group.label = fit.parameters[k].name;
-    for (const DiscretisationShift* d : run) group.values.push_back(d->shift[k] / deviation);
+    for (const SystematicShift* d : run) group.values.push_back(d->shift[k] / deviation);
     alt += fit.parameters[k].name;
     for (const double value : group.values) alt += " " + short_text(value, 2);
     alt += "; ";
   }
   if (chart.groups.empty()) return;
-  page.svg_figure(svg(chart), alt,
-                  "By how much each kind of finer step would move a parameter, in units of the standard "
-                  "deviation that noise and misfit alone give it. Bars beyond ±1 say that the "
-                  "discretisation, and not the footage, limits that answer.");
+  page.svg_figure(
+      svg(chart), alt,
+      "By how much each would move a parameter, in units of the standard deviation that noise and misfit "
+      "alone give it. Bars beyond ±1 say that this, and not the footage, limits that answer.");
 }
 
 }  // namespace
 
 void add_discretisation(HtmlPage& page, const ReportData& data) {
   const FitResult& fit = data.fit;
-  if (fit.discretisation.empty()) return;
-  page.section("discretisation", "What finer elements and steps would do");
-  std::vector<const DiscretisationShift*> run;
+  if (fit.systematic.empty()) return;
+  page.section("discretisation", "What finer elements, steps and held values would do");
+  std::vector<const SystematicShift*> run;
   std::vector<std::string> list;
-  for (const DiscretisationShift& d : fit.discretisation) {
+  for (const SystematicShift& d : fit.systematic) {
     if (d.failure.empty()) run.push_back(&d);
     list.push_back(d.name + ": " + d.change +
                    (d.failure.empty()
@@ -70,17 +70,19 @@ void add_discretisation(HtmlPage& page, const ReportData& data) {
                         : ". Could not be run: " + d.failure));
   }
   page.paragraph(
-      "At the answer the tracks were predicted again with each kind of step of the discretisation finer. To "
-      "first order the answer would move by what the table says; the intervals have room for it.");
+      "At the answer the tracks were predicted again with each kind of step of the discretisation finer, and "
+      "differentiated by parameters that are held without being known exactly. To first order the answer "
+      "would move "
+      "by what the table says; the intervals have room for it.");
   page.list(list);
   if (run.empty()) return;
   HtmlTable table;
   table.caption = "By how much the answer would move.";
   table.header = {"parameter"};
-  for (const DiscretisationShift* d : run) table.header.push_back(d->name);
+  for (const SystematicShift* d : run) table.header.push_back(d->name);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
     std::vector<TableCell> row = {fit.parameters[k].name};
-    for (const DiscretisationShift* d : run) row.emplace_back(moved(fit.parameters[k], d->shift[k]));
+    for (const SystematicShift* d : run) row.emplace_back(moved(fit.parameters[k], d->shift[k]));
     table.rows.push_back(std::move(row));
   }
   page.table(table);

@@ -82,7 +82,7 @@ inline fitting::FitResult write_synthetic_fit(const std::string& folder, int fra
                        {"another camera 45° up", {0.62, std::nan(""), 0.4, 0.9}}};
   fit.measured = {{0, 1, "force_finger_z", -0.11, 0.005, -0.108},
                   {0, 2, "force_finger_z", -0.14, 0.005, -0.139}};
-  fit.discretisation = {
+  fit.systematic = {
       {"thickness", "layers stacked", "", 0.05, 3.1, {0.01, -0.02, 0.005, 0.001}},
       {"plane", "order 4 in the plane instead of 3", "", 0.11, 5.2, {0.012, 0.09, -0.01, 0.002}},
       {"steps", "4 steps per frame instead of 2", "did not converge in frame 3", 0, 0, {}}};

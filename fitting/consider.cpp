@@ -1,0 +1,110 @@
+#include "fitting/consider.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "fitting/fit_logs.h"
+#include "sim/core/error.h"
+
+namespace rhytid::fitting {
+namespace {
+
+bool is_fitted(const JointFitInput& input, const FitParameter& p) {
+  return std::any_of(
+      input.options.parameters.begin(), input.options.parameters.end(), [&](const FitParameter& other) {
+        return other.address == p.address && (other.clip == p.clip || other.clip.empty() || p.clip.empty());
+      });
+}
+
+/// "off by a factor 1.35", "off by 0.5 mm".
+std::string off_by(const FitVariable& v, double sigma) {
+  char text[64];
+  if (v.transform == ParameterTransform::log)
+    std::snprintf(text, sizeof text, "off by a factor %.3g", std::exp(sigma));
+  else
+    std::snprintf(text, sizeof text, "off by %.3g%s%s", sigma,
+                  v.transform == ParameterTransform::none ? " " : " (logit)",
+                  v.transform == ParameterTransform::none ? v.unit.c_str() : "");
+  return text;
+}
+
+}  // namespace
+
+std::vector<FitParameter> considered_parameters(const JointFitInput& input) {
+  std::vector<FitParameter> list;
+  const auto add = [&](const FitParameter& p) {
+    const bool is_known = std::any_of(list.begin(), list.end(), [&](const FitParameter& other) {
+      return other.address == p.address && other.clip == p.clip;
+    });
+    if (!is_known && !is_fitted(input, p)) list.push_back(p);
+  };
+  if (input.options.consider) {
+    for (const FitParameter& p : *input.options.consider) add(p);
+    return list;
+  }
+  for (const FitClip& clip : input.clips)
+    for (const ColliderScene& collider : clip.scene.colliders)
+      if (collider.friction && collider.friction->coefficient > 0) {
+        FitParameter p;
+        p.address = "/colliders/" + collider.name + "/friction/coefficient";
+        p.prior_sigma = kFrictionSigma;
+        add(p);
+      }
+  return list;
+}
+
+std::vector<SystematicShift> considered_shifts(const JointFitInput& input, const JointProblem& problem,
+                                               const VectorXd& t, const FitProblem::Linearised& linearised,
+                                               const MatrixXd& basis, const FitObserver& observer) {
+  const std::vector<FitParameter> held = considered_parameters(input);
+  if (held.empty() || (observer.should_stop && observer.should_stop())) return {};
+  if (observer.note) observer.note("held parameters: by how much they would move the answer");
+  JointFitInput wide = input;
+  for (FitParameter p : held) {
+    p.prior_sigma.reset();
+    wide.options.parameters.push_back(std::move(p));
+  }
+  if (!wide.evaluations.empty()) wide.evaluations += "/considered";
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<SystematicShift> shifts;
+  const Eigen::Index n = problem.num_parameters();
+  try {
+    JointProblem considered(wide.clips, wide.options);
+    considered.stop_when(observer.should_stop);
+    const FitLogs logs(wide, considered, observer.note);
+    VectorXd all = considered.initial();
+    all.head(n) = t;
+    const auto at = considered.linearised(all);
+    if (considered.was_stopped()) return {};
+    for (std::size_t h = 0; h < held.size(); ++h) {
+      const Eigen::Index column = n + static_cast<Eigen::Index>(h);
+      const FitVariable& v = considered.variables()[static_cast<std::size_t>(column)];
+      const double sigma = *held[h].prior_sigma;
+      SystematicShift& found = shifts.emplace_back();
+      found.name = "held " + v.name;
+      found.change = v.name + " " + off_by(v, sigma);
+      const double used = v.to_parameter(all[column]);
+      if (!at)
+        found.failure = considered.last_failure();
+      else if (std::fabs(used - v.initial) > 1e-9 * std::max(1e-12, std::fabs(v.initial)))
+        found.failure = "the scene's value lies outside the usual bounds of this parameter";
+      else if (at->jacobian.rows() != linearised.jacobian.rows())
+        found.failure = "other tracks";
+      if (!found.failure.empty()) continue;
+      const VectorXd shift =
+          -sigma *
+          (basis * (basis.transpose() * (linearised.jacobian.transpose() * at->jacobian.col(column))));
+      found.shift.assign(shift.begin(), shift.end());
+    }
+  } catch (const InputError& error) {
+    SystematicShift& found = shifts.emplace_back();
+    found.name = "held", found.change = "held parameters", found.failure = error.what();
+  }
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (SystematicShift& shift : shifts) shift.seconds = seconds / static_cast<double>(shifts.size());
+  return shifts;
+}
+
+}  // namespace rhytid::fitting
