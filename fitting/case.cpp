@@ -59,6 +59,8 @@ FitCase read_fit(const json& j) {
     for (int a = 0; a < 3; ++a) r.low[a] = region["box"]["low"][a], r.high[a] = region["box"]["high"][a];
     c.still.push_back(std::move(r));
   }
+  c.starts = j["starts"], c.local_fits = j["local_fits"], c.start_spread = j["start_spread"];
+  c.screen_frames = j["screen_frames"], c.seed = j["seed"];
   return c;
 }
 

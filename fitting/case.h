@@ -74,6 +74,12 @@ struct FitCase {
   /// Where tracked points stand still on the head: its motion is taken out by them. Empty: it stands still.
   std::vector<StillRegion> still;
   std::optional<WrinkleLine> wrinkles;  ///< where measured wrinkles are
+  /// Further starts, see fitting/starts.h.
+  int starts = 1;           ///< with the case's own
+  int local_fits = 3;       ///< searches at most, from the best of them
+  double start_spread = 1;  ///< half width of the box that they are in, transformed; 1 = a quarter of a range
+  int screen_frames = 0;    ///< they are compared on, 0 = half of those compared
+  unsigned seed = 1;        ///< of the starts
   /// Whether what the discretisation does to the answer is estimated, and enters the intervals.
   bool discretisation_check = true;
   /// Held parameters whose error enters the intervals (consider.h), σ_h in prior_sigma. Nothing given: the friction

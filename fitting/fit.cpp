@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "fitting/consider.h"
 #include "fitting/discretisation.h"
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
 #include "fitting/further_views.h"
+#include "fitting/starts.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
@@ -35,8 +37,9 @@ std::string status_text(const OptimiserOutcome& outcome) {
 }
 
 /// Where the best point was found: its fit, with intervals where there is a derivative.
-void describe_best(const JointFitInput& input, JointProblem& problem, const VectorXd& t, bool have_point,
-                   const FitObserver& observer, FitResult& result) {
+void describe_best(const JointFitInput& input, JointProblem& problem, const StartsOutcome& starts,
+                   bool have_point, const FitObserver& observer, FitResult& result) {
+  const VectorXd& t = starts.best().t.size() > 0 ? starts.best().t : starts.starts[0].t;
   const auto linearised = have_point ? problem.linearised(t) : std::nullopt;
   const bool is_there = have_point && !problem.evaluate(t).failed;  // else stopped while it was run again
   const auto stop_here = [&result] {
@@ -60,6 +63,7 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Vect
   const std::map<std::string, double> truth = truth_in_gauge(input, problem, result);
   if (!linearised) {
     add_parameters(problem, t, nullptr, truth, result);
+    add_starts(problem, starts, input.options, 1, result);
     result.notes.push_back("No intervals: the run at the last values could not be differentiated.");
     return;
   }
@@ -87,6 +91,7 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Vect
   result.right_vectors = found.right_vectors();
   result.correlation = found.correlation();
   for (std::string& sentence : found.cannot_tell()) result.cannot_tell.push_back(std::move(sentence));
+  add_starts(problem, starts, input.options, noise.widening, result);
   result.notes.push_back(interval_note(problem, noise, found));
   result.further_views = further_views(problem, t, *linearised);  // last: it may need a run again
   if (problem.was_stopped()) stop_here();
@@ -134,22 +139,26 @@ FitResult run_fit(const JointFitInput& input, const FitObserver& observer) {
     throw InputError("fit: optimiser", "'" + input.options.optimiser + "'", "ceres or nlopt");
   const OptimiserOptions options{.max_evaluations = input.options.max_evaluations};
   const bool is_ceres = input.options.optimiser == "ceres";
-  Search search(problem);
-  OptimiserOutcome outcome = is_ceres ? fit_with_ceres(search, options, observer.iteration)
-                                      : fit_with_nlopt(search, options, observer.iteration);
+  const LocalFit local_fit = [&](Search& search) {
+    return is_ceres ? fit_with_ceres(search, options, observer.iteration)
+                    : fit_with_nlopt(search, options, observer.iteration);
+  };
+  const StartsOutcome starts = fit_from_starts(input, problem, local_fit, observer);
+  const OptimiserOutcome& outcome = starts.best();
 
   FitResult result;
   result.optimiser = is_ceres ? "ceres (Levenberg-Marquardt, tangent)" : "nlopt (SLSQP, adjoint)";
   result.status = status_text(outcome);
   result.converged = outcome.status == OptimiserOutcome::Status::converged;
-  result.history = std::move(outcome.history);
+  result.stopped = outcome.status == OptimiserOutcome::Status::stopped;
+  result.history = outcome.history;
   result.gauge = problem.gauge_sentence();
   if (!result.history.empty()) result.initial_cost = result.history.front().cost;
-  result.final_cost = search.best_cost();
-  const bool has_best = search.best().size() > 0;
-  describe_best(input, problem, has_best ? search.all(search.best()) : problem.initial(),
-                has_best && !problem.was_stopped(), observer, result);
+  const bool has_best = outcome.t.size() > 0 && std::isfinite(outcome.cost);
+  if (has_best) result.final_cost = outcome.cost;
+  describe_best(input, problem, starts, has_best && !result.stopped, observer, result);
   add_counts(problem, result);
+  result.forward_runs += starts.screening_runs;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }

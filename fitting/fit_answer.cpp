@@ -154,6 +154,41 @@ std::string shift_table(const FitResult& result) {
   return text;
 }
 
+/// The optima that searches from several starts ended at, the best first.
+std::string start_table(const FitResult& result) {
+  int num_optima = 0, searched = 0, runs = 0, failed = 0;
+  for (const FittedStart& start : result.starts) {
+    num_optima = std::max(num_optima, start.optimum);
+    searched += start.status.empty() ? 0 : 1;
+    failed += start.failure.empty() ? 0 : 1;
+    runs += start.forward_runs;
+  }
+  std::vector<Row> rows = {{"optimum", "status", "from starts", "screened", "cost", "runs"}};
+  for (const FittedParameter& p : result.parameters) rows[0].push_back(p.name);
+  for (int m = 1; m <= num_optima; ++m) {
+    const FittedStart* best = nullptr;
+    std::string from;
+    int of_optimum = 0;
+    for (std::size_t i = 0; i < result.starts.size(); ++i) {
+      const FittedStart& start = result.starts[i];
+      if (start.optimum != m) continue;
+      from += (from.empty() ? "" : ", ") + std::to_string(i);
+      of_optimum += start.forward_runs;
+      if (best == nullptr || start.final_cost < best->final_cost) best = &start;
+    }
+    if (best == nullptr) continue;
+    Row row = {
+        std::to_string(m),         best->status, from, number(best->screened_cost), number(best->final_cost),
+        std::to_string(of_optimum)};
+    for (const double value : best->values) row.push_back(number(value));
+    rows.push_back(std::move(row));
+  }
+  std::string text = "Starts: " + std::to_string(result.starts.size());
+  if (failed > 0) text += ", of which " + std::to_string(failed) + " could not be run";
+  text += "; searches from " + std::to_string(searched) + " in " + std::to_string(runs) + " runs.\n";
+  return num_optima == 0 ? text : text + layout(rows);
+}
+
 }  // namespace
 
 std::string answer_text(const FitResult& result) {
@@ -176,6 +211,7 @@ std::string answer_text(const FitResult& result) {
   text += measured_lines(result);
   if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";
+  if (!result.starts.empty()) text += "\n" + start_table(result) + "\n";
   if (!result.systematic.empty()) text += "\n" + shift_table(result);
   text += further_view_line(result);
   for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";

@@ -87,6 +87,20 @@ void measurement_fields(Archive& field, Record& m) {
 }
 
 template <class Archive, class Record>
+void start_fields(Archive& field, Record& s) {
+  field("initial", s.initial);
+  field("screened_cost", s.screened_cost);
+  field("failure", s.failure);
+  field("status", s.status);
+  field("final_cost", s.final_cost);
+  field("values", s.values);
+  field("forward_runs", s.forward_runs);
+  field("optimum", s.optimum);
+  field("evaluations", s.evaluations);
+  field("costs", s.costs);
+}
+
+template <class Archive, class Record>
 void view_fields(Archive& field, Record& v) {
   field("camera", v.camera);
   field("num_tracks", v.num_tracks);
@@ -140,6 +154,7 @@ void result_fields(Archive& field, Record& r) {
   field.optional("systematic", r.systematic);
   field.optional("further_views", r.further_views);
   field.optional("measured", r.measured);
+  field.optional("starts", r.starts);
   field("singular_values", r.singular_values);
   field("right_vectors", r.right_vectors);
   field("correlation", r.correlation);
@@ -215,6 +230,11 @@ class Writer {
   static Json json(const FittedMeasurement& v) {
     Writer w;
     measurement_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const FittedStart& v) {
+    Writer w;
+    start_fields(w, v);
     return std::move(w.out);
   }
   static Json json(const FittedView& v) {
@@ -328,6 +348,10 @@ class Reader {
     Reader r(j, where);
     measurement_fields(r, v);
   }
+  static void read(const Json& j, FittedStart& v, const std::string& where) {
+    Reader r(j, where);
+    start_fields(r, v);
+  }
   static void read(const Json& j, FittedView& v, const std::string& where) {
     Reader r(j, where);
     view_fields(r, v);
@@ -364,6 +388,14 @@ void check_sizes(const FitResult& result, const std::string& where) {
   for (size_t i = 0; i < result.systematic.size(); ++i) {
     const auto size = static_cast<Eigen::Index>(result.systematic[i].shift.size());
     if (size > 0) check(("systematic/" + std::to_string(i) + "/shift").c_str(), size, 1, 1);
+  }
+  for (size_t i = 0; i < result.starts.size(); ++i) {
+    const FittedStart& start = result.starts[i];
+    const std::string at = "starts/" + std::to_string(i);
+    for (const std::vector<double>* values : {&start.initial, &start.values})
+      if (!values->empty()) check(at.c_str(), static_cast<Eigen::Index>(values->size()), 1, 1);
+    if (start.evaluations.size() != start.costs.size())
+      throw InputError(where + "/" + at, "other numbers of evaluations and costs", "one cost for each");
   }
   for (size_t i = 0; i < result.history.size(); ++i) {
     const auto size = static_cast<Eigen::Index>(result.history[i].values.size());

@@ -1,6 +1,7 @@
 // What a fit found: the one record from which the terminal answer, fit.json and report.html are made.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -55,6 +56,22 @@ struct FitIteration {
   std::vector<double> values;  ///< of the parameters, internal units
 };
 
+/// One of several starts (starts.h); the first is the case's own.
+struct FittedStart {
+  std::vector<double> initial;  ///< values of the parameters, internal units
+  /// On the early frames, comparable among starts alone; NaN when that run failed.
+  double screened_cost = std::numeric_limits<double>::quiet_NaN();
+  std::string failure;  ///< of that run
+  /// Of the search from there; empty, NaN and 0 when there was none or all its runs failed.
+  std::string status;
+  double final_cost = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> values;
+  int forward_runs = 0;
+  int optimum = 0;  ///< 1 = the best; starts with the same number ended at the same values; 0 = none
+  std::vector<int> evaluations;  ///< of the search so far, at each of its iterations
+  std::vector<double> costs;     ///< there
+};
+
 /// One observation against the fitted prediction.
 struct FitResidual {
   int frame = 0, track = 0;
@@ -105,6 +122,7 @@ struct FitResult {
   double seconds = 0, forward_seconds = 0;  ///< whole fit; median forward run
   std::vector<FitIteration> history;
   std::vector<SystematicShift> systematic;  ///< finer steps, then held parameters
+  std::vector<FittedStart> starts;          ///< empty when there was one
   VectorXd singular_values;              ///< of the whitened Jacobian by transformed parameters, descending
   MatrixXd right_vectors;                ///< [parameters][parameters] columns belong to singular_values
   MatrixXd correlation;                  ///< [parameters][parameters] of the covariance that sigma is from

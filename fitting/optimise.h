@@ -31,6 +31,9 @@ struct OptimiserOutcome {
 /// Called after every accepted or rejected iteration of the optimiser.
 using FitIterationCallback = std::function<void(const FitIteration&)>;
 
+/// A local search to its end, by whichever optimiser.
+using LocalFit = std::function<OptimiserOutcome(Search&)>;
+
 /// One Ceres cost function for the whole objective: the Jacobian is formed only when asked for, a failed
 /// forward run shrinks the trust region.
 OptimiserOutcome fit_with_ceres(Search& search, const OptimiserOptions& options,

@@ -54,7 +54,11 @@ class Fit : public Verb {
            "fit these addresses instead of those of the case (which still lend bounds and starts), as "
            "--parameters /ligaments/stiffness,/base/stiffness")
         ->delimiter(',');
-    app.add_option("--max-evaluations", max_evaluations_, "forward runs at most")
+    app.add_option("--max-evaluations", max_evaluations_, "forward runs at most, from each start")
+        ->check(CLI::Range(1, 100000));
+    app.add_option("--starts", starts_,
+                   "so many starts, that of the case and seeded ones about it: all are compared by a run on "
+                   "the early frames, the fit goes on from the best few (/fit/local_fits)")
         ->check(CLI::Range(1, 100000));
     app.add_flag("--anew", anew_, "compute everything again, whatever an earlier start of this fit left");
   }
@@ -113,6 +117,7 @@ class Fit : public Verb {
     fitting::FitCase options = c.fit;
     if (!optimiser_.empty()) options.optimiser = optimiser_;
     if (max_evaluations_ > 0) options.max_evaluations = max_evaluations_;
+    if (starts_ > 0) options.starts = starts_;
     if (addresses_.empty()) return options;
     options.parameters.clear();
     const std::vector<Scene> scenes = fitting::scenes_of(c);
@@ -127,6 +132,11 @@ class Fit : public Verb {
     return options;
   }
 
+  static int most_runs(const fitting::FitCase& options) {
+    if (options.starts == 1) return options.max_evaluations;
+    return options.starts + std::min(options.starts, options.local_fits) * options.max_evaluations;
+  }
+
   static fitting::FitObserver observer(VerbContext& context, const fitting::FitCase& options) {
     fitting::FitObserver o;
     Progress& progress = context.progress;
@@ -137,7 +147,7 @@ class Fit : public Verb {
                     " tracks on the skin, " + std::to_string(r.left_out()) + " left out, " +
                     std::to_string(p.num_observations()) + " observations in " + std::to_string(p.frames()) +
                     " frames");
-      if (std::exchange(is_first, false)) progress.stage("fit", options.max_evaluations);
+      if (std::exchange(is_first, false)) progress.stage("fit", most_runs(options));
     };
     o.note = [&progress](const std::string& text) { progress.note(text); };
     o.run = [&progress](const fitting::FitProgress& p) {
@@ -153,7 +163,7 @@ class Fit : public Verb {
 
   std::string optimiser_;
   std::vector<std::string> addresses_;
-  int max_evaluations_ = 0;
+  int max_evaluations_ = 0, starts_ = 0;
   bool anew_ = false;
 };
 

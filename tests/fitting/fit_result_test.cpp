@@ -44,7 +44,7 @@ FitResult example() {
   r.further_views = {{"up", {0.5, nan_value}}};
   r.measured = {{1, 3, "force_finger_x", 0.25, 1. / 3, 0.3}};
   r.systematic = {{"plane", "order 4", "", 0.25, 1.5, {0.1, -1. / 3}},
-                      {"steps", "finer", "no end", 0, 2, {}}};
+                  {"steps", "finer", "no end", 0, 2, {}}};
   r.history = {{0, 1, 10, 1, 0, 0.5, {1, 2}}, {1, 3, 1. / 7, 1e-3, 0.2, 1.5, {1.1, nan_value}}};
   r.singular_values = VectorXd::LinSpaced(2, 3.3, 0.1);
   r.right_vectors = MatrixXd::Identity(2, 2);
@@ -53,6 +53,9 @@ FitResult example() {
   r.cannot_tell = {"the modulus alone", "line\nbreak"};
   r.notes = {"seed 1"};
   r.residuals = {{3, 7, 1. / 3, 2, 0.1 + 0.2, nan_value, 1}, {4, 7, 1, 2, -3, 4, 0.5}};
+  r.starts.resize(2);
+  r.starts[0] = {{1, 2}, 1. / 3, "", "converged", 0.1, {1.5, 2.5}, 7, 1, {1, 3}, {9, 0.1 + 0.2}};
+  r.starts[1].failure = "a run that failed";
   r.tracks_file = "tracks.csv";
   return r;
 }
@@ -101,6 +104,13 @@ TEST(FitResult, ReadsBackBitForBit) {
   EXPECT_EQ(s.singular_values, r.singular_values);
   EXPECT_EQ(s.right_vectors, r.right_vectors);
   EXPECT_EQ(s.cannot_tell, r.cannot_tell);
+  ASSERT_EQ(s.starts.size(), 2u);
+  EXPECT_EQ(s.starts[0].values, r.starts[0].values);
+  EXPECT_EQ(s.starts[0].costs, r.starts[0].costs);
+  EXPECT_EQ(s.starts[0].evaluations, r.starts[0].evaluations);
+  EXPECT_EQ(s.starts[0].optimum, 1);
+  EXPECT_EQ(s.starts[1].failure, r.starts[1].failure);
+  EXPECT_TRUE(std::isnan(s.starts[1].screened_cost) && std::isnan(s.starts[1].final_cost));
   ASSERT_EQ(s.residuals.size(), 2u);
   EXPECT_EQ(s.residuals[0].x_px, 1. / 3);
   EXPECT_EQ(s.residuals[0].predicted_x_px, 0.1 + 0.2);
@@ -153,6 +163,7 @@ TEST(FitResult, DamagedFilesAreRefusedByName) {
   EXPECT_THAT(message_after("/fit.json", "\"gauge\"", "\"gouge\""), HasSubstr("/gauge"));
   EXPECT_THAT(message_after("/fit.json", "\"unit\": \"MPa\"", "\"unit\": 3"),
               HasSubstr("/parameters/0/unit"));
+  EXPECT_THAT(message_after("/fit.json", "\"costs\": [\n", "\"costs\": [\n 3,\n"), HasSubstr("starts/0"));
   EXPECT_THAT(message_after("/fit.json", "{", "["), HasSubstr("not readable as JSON"));
   EXPECT_THAT(message_after("/fit.json", "\"num_residuals\": 2", "\"num_residuals\": 3"),
               HasSubstr("residuals.csv"));

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "sim/output/plot.h"
@@ -9,7 +10,9 @@ namespace rhytid::tools {
 namespace {
 
 using fitting::FitIteration;
+using fitting::FitResult;
 using fitting::FittedParameter;
+using fitting::FittedStart;
 
 /// An optimiser records a trial whose run failed with a cost near the largest number there is.
 constexpr double failed_cost = 1e100;
@@ -38,6 +41,79 @@ PlotSeries series_of(const std::vector<FitIteration>& history, const std::string
 double between_bounds(const FittedParameter& p, double value) {
   if (p.transform == "log" && p.lower > 0) return std::log(value / p.lower) / std::log(p.upper / p.lower);
   return (value - p.lower) / (p.upper - p.lower);
+}
+
+/// Optima that the searches ended at, the best first.
+void add_optima(HtmlPage& page, const FitResult& fit) {
+  HtmlTable table;
+  table.caption =
+      "Optima. Searches that ended within a tenth of a standard deviation of each other are one; the "
+      "screened cost is that of the best of them on the early frames, comparable among starts alone.";
+  table.header = {"optimum", "from starts", "status", "screened cost", "cost", "forward runs"};
+  table.text_columns = 3;
+  table.wide = true;
+  for (const FittedParameter& p : fit.parameters)
+    table.header.push_back(p.name + (p.unit.empty() ? "" : " [" + p.unit + "]"));
+  int num_optima = 0;
+  for (const FittedStart& start : fit.starts) num_optima = std::max(num_optima, start.optimum);
+  for (int m = 1; m <= num_optima; ++m) {
+    const FittedStart* best = nullptr;
+    std::string from;
+    int runs = 0;
+    for (size_t i = 0; i < fit.starts.size(); ++i) {
+      const FittedStart& start = fit.starts[i];
+      if (start.optimum != m) continue;
+      from += (from.empty() ? "" : ", ") + std::to_string(i);
+      runs += start.forward_runs;
+      if (best == nullptr || start.final_cost < best->final_cost) best = &start;
+    }
+    if (best == nullptr || best->values.size() != fit.parameters.size()) continue;
+    const std::string screened = std::isnan(best->screened_cost) ? "–" : short_text(best->screened_cost, 5);
+    std::vector<TableCell> row = {
+        std::to_string(m),   from, best->status, screened, short_text(best->final_cost, 6),
+        std::to_string(runs)};
+    for (const double value : best->values) row.emplace_back(short_text(value, 4));
+    table.rows.push_back(std::move(row));
+  }
+  if (!table.rows.empty()) page.table(table);
+}
+
+void add_starts(HtmlPage& page, const FitResult& fit) {
+  if (fit.starts.empty()) return;
+  page.heading("From several starts");
+  LinePlot fan;
+  fan.width = 640;
+  fan.height = 340;
+  fan.x.label = "forward runs of the search";
+  fan.y.label = "cost";
+  fan.y.logarithmic = true;
+  long searched = 0, failed = 0;
+  std::string alt = "Cost of each search over its forward runs:";
+  for (size_t i = 0; i < fit.starts.size(); ++i) {
+    const FittedStart& start = fit.starts[i];
+    failed += start.failure.empty() ? 0 : 1;
+    if (start.status.empty()) continue;
+    ++searched;
+    PlotSeries series;
+    series.label = "start " + std::to_string(i) + (i == 0 ? " (of the case)" : "");
+    series.style = PlotStyle::line_and_points;
+    series.dashed = fan.series.size() >= 7;  // the palette repeats
+    for (size_t j = 0; j < start.costs.size(); ++j) {
+      series.x.push_back(start.evaluations[j]);
+      series.y.push_back(start.costs[j] < failed_cost ? start.costs[j] : std::nan(""));
+    }
+    if (std::isfinite(start.final_cost))
+      alt += " start " + std::to_string(i) + " to " + short_text(start.final_cost, 4) + ";";
+    fan.series.push_back(std::move(series));
+  }
+  page.paragraph(counted(static_cast<long>(fit.starts.size()), "start") +
+                 " were compared on the early frames" +
+                 (failed > 0 ? " (" + std::to_string(failed) + " could not be run)" : "") + ", " +
+                 std::to_string(searched) +
+                 " of them were searched from. What follows about the answer is of the best search.");
+  fan.height += 14 * static_cast<int>(std::max<size_t>(6, fan.series.size()) - 6);
+  page.svg_figure(svg(fan), alt, "Cost over the forward runs of each search, on a logarithmic scale.");
+  add_optima(page, fit);
 }
 
 }  // namespace
@@ -84,6 +160,7 @@ void add_convergence(HtmlPage& page, const ReportData& data) {
                   "Each parameter between its lower (0) and upper (1) bound, logarithmic for those fitted as "
                   "logarithms.");
   page.end_row();
+  add_starts(page, data.fit);
 }
 
 }  // namespace rhytid::tools

@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <sstream>
 
 #include "adjoint/certificate_report.h"
@@ -96,6 +97,33 @@ TEST(Report, HoldsTheWholeFit) {
   EXPECT_EQ(count(html, "src=\"data:image/png;base64,"), 5u);
   EXPECT_EQ(count(html, "src=\"data:image/jpeg;base64,"), 2u);
   EXPECT_EQ(count(html, "<svg"), 7u);
+}
+
+TEST(Report, SeveralStartsAreAFanAndATable) {
+  const std::string folder = folder_for("starts");
+  fitting::FitResult fit = test::write_synthetic_fit(folder, 1);
+  const size_t plots = count(without_pictures(read_file(report(folder, false).path)), "<svg");
+  fit.starts.resize(3);
+  for (size_t i = 0; i < 2; ++i) {
+    fitting::FittedStart& start = fit.starts[i];
+    start.screened_cost = 900 + static_cast<double>(i);
+    start.status = "converged";
+    start.final_cost = i == 0 ? 345.25 : 210;
+    start.optimum = i == 0 ? 2 : 1;
+    start.forward_runs = 8;
+    for (const auto& p : fit.parameters) start.values.push_back(p.value * (i == 0 ? 7 : 1));
+    start.initial = start.values;
+    start.evaluations = {1, 2, 5};
+    start.costs = {1000, std::numeric_limits<double>::max(), start.final_cost};
+  }
+  fit.starts[2].failure = "did not complete";
+  fitting::write_fit_result(fit, folder);
+  const std::string html = without_pictures(read_file(report(folder, false).path));
+  EXPECT_EQ(test::html_complaint(html), "");
+  EXPECT_EQ(count(html, "<svg"), plots + 1);
+  EXPECT_THAT(html, AllOf(HasSubstr("From several starts"), HasSubstr("3 starts were compared"),
+                          HasSubstr("(1 could not be run)"), HasSubstr("2 of them were searched from"),
+                          HasSubstr("start 0 (of the case)"), HasSubstr("345.25"), Not(HasSubstr("nan"))));
 }
 
 TEST(Report, IsTheSameTwice) {
