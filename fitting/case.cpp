@@ -336,6 +336,17 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
   if (c.name.empty())
     c.name = scenes[0].name.empty() || !c.clips.empty() ? fs::path(path).stem().string() : scenes[0].name;
   read_parameters(located, scenes, c);
+  for (std::size_t i = 0; i < root["fit"]["stages"].size(); ++i) {
+    const std::string pointer = "/fit/stages/" + std::to_string(i);
+    const json& stage = root["fit"]["stages"][i];
+    c.fit.stages.push_back(
+        {settings_at(located, pointer + "/settings"), stage["last_frame"], stage["max_evaluations"]});
+    try {
+      (void)scenes_of_stage(c, c.fit.stages.back());
+    } catch (const InputError& error) {
+      throw InputError(located.where(pointer) + ": " + pointer + ": " + error.what());
+    }
+  }
   read_considered(located, scenes, c);
   for (const Scene& scene : scenes) check_gauge_layer(located, scene, c.fit.gauge_layer);
   return c;

@@ -63,8 +63,17 @@ struct TrackCase {
   int window = 21;                           ///< px, odd: side of the window about a point
 };
 
+/// A cheaper fit before the fit (stages.h).
+struct StageCase {
+  std::vector<Setting> settings;  ///< of the scene, behind those of the case or clip
+  int last_frame = 0;             ///< 0 = that of the fit
+  int max_evaluations = 10;       ///< forward runs
+  std::string words() const;      ///< what it does otherwise, for messages
+};
+
 struct FitCase {
   std::vector<FitParameter> parameters;
+  std::vector<StageCase> stages;    ///< before the fit, in order
   std::string optimiser = "ceres";  ///< ceres | nlopt
   int max_evaluations = 30;         ///< forward runs
   double robust_scale = 3;          ///< Huber threshold in standard deviations; 0 = plain least squares
@@ -136,6 +145,8 @@ std::vector<FitParameter> parameters_named(const Case& c, const std::vector<Scen
 
 /// The scenes that a fit of the case runs: one, or one per clip. Throws InputError.
 std::vector<Scene> scenes_of(const Case& c);
+/// Those of a stage. Throws InputError.
+std::vector<Scene> scenes_of_stage(const Case& c, const StageCase& stage);
 
 /// A view of a clip as a case of its own, as `render` and `track` know it, and where its files lie below the
 /// folder of results: NAME, or NAME/VIEW where several cameras saw the clip.

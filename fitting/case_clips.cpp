@@ -24,6 +24,24 @@ std::vector<Scene> scenes_of(const Case& c) {
   return scenes;
 }
 
+std::vector<Scene> scenes_of_stage(const Case& c, const StageCase& stage) {
+  Case coarse = c;
+  const auto add = [&stage](std::vector<Setting>& settings) {
+    settings.insert(settings.end(), stage.settings.begin(), stage.settings.end());
+  };
+  add(coarse.scene_settings);
+  for (ClipCase& clip : coarse.clips) add(clip.scene_settings);
+  return scenes_of(coarse);
+}
+
+std::string StageCase::words() const {
+  std::string text;
+  for (const Setting& setting : settings) text += (text.empty() ? "" : ", ") + setting.text;
+  if (last_frame > 0)
+    text += (text.empty() ? "" : ", ") + std::string("frames to ") + std::to_string(last_frame);
+  return text.empty() ? "the scene as it is" : text;
+}
+
 std::vector<FitParameter> parameters_named(const Case& c, const std::vector<Scene>& scenes,
                                            const std::string& address, const std::string& where) {
   const auto described = [&](const Scene& scene, const std::string& at) {

@@ -9,11 +9,15 @@
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
 #include "fitting/further_views.h"
+#include "fitting/stages.h"
 #include "fitting/starts.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
 namespace {
+
+/// A stage only says where to begin: a step that lowers F by less is not worth its run.
+constexpr double kStageDecrease = 1e-2;
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -117,8 +121,11 @@ void add_counts(const JointProblem& problem, FitResult& result) {
 }  // namespace
 
 FitResult run_fit(const FitInput& input, const FitObserver& observer) {
+  std::vector<std::vector<Scene>> stages;
+  for (const Scene& scene : input.stages) stages.push_back({scene});
   return run_fit(JointFitInput{.clips = {{{}, {}, input.scene, {input.camera}, input.tracks}},
                                .options = input.options,
+                               .stages = std::move(stages),
                                .truth = input.truth,
                                .evaluations = input.evaluations,
                                .anew = input.anew},
@@ -139,11 +146,19 @@ FitResult run_fit(const JointFitInput& input, const FitObserver& observer) {
     throw InputError("fit: optimiser", "'" + input.options.optimiser + "'", "ceres or nlopt");
   const OptimiserOptions options{.max_evaluations = input.options.max_evaluations};
   const bool is_ceres = input.options.optimiser == "ceres";
-  const LocalFit local_fit = [&](Search& search) {
-    return is_ceres ? fit_with_ceres(search, options, observer.iteration)
-                    : fit_with_nlopt(search, options, observer.iteration);
+  const auto fit_with = [&](Search& search, const OptimiserOptions& used,
+                            const FitIterationCallback& callback) {
+    return is_ceres ? fit_with_ceres(search, used, callback) : fit_with_nlopt(search, used, callback);
   };
-  const StartsOutcome starts = fit_from_starts(input, problem, local_fit, observer);
+  const LocalFit local_fit = [&](Search& search) { return fit_with(search, options, observer.iteration); };
+  StagesOutcome stages = run_stages(
+      input, problem,
+      [&](Search& search, int most) {
+        return fit_with(search, {.max_evaluations = most, .relative_decrease = kStageDecrease}, {});
+      },
+      observer);
+  const StartsOutcome starts =
+      fit_from_starts(input, problem, better_start(problem, stages), local_fit, observer);
   const OptimiserOutcome& outcome = starts.best();
 
   FitResult result;
@@ -152,6 +167,7 @@ FitResult run_fit(const JointFitInput& input, const FitObserver& observer) {
   result.converged = outcome.status == OptimiserOutcome::Status::converged;
   result.stopped = outcome.status == OptimiserOutcome::Status::stopped;
   result.history = outcome.history;
+  result.stages = stages.stages;
   result.gauge = problem.gauge_sentence();
   if (!result.history.empty()) result.initial_cost = result.history.front().cost;
   const bool has_best = outcome.t.size() > 0 && std::isfinite(outcome.cost);

@@ -24,14 +24,16 @@ struct FitInput {
   /// Folder of the log of evaluations (evaluation_log.h) that lets an interrupted fit be resumed; empty:
   /// none.
   std::string evaluations = {};
-  bool anew = false;  ///< do not use what the log already holds
+  bool anew = false;               ///< do not use what the log already holds
+  std::vector<Scene> stages = {};  ///< of each of `options.stages`
 };
 
 /// Several clips, fitted together.
 struct JointFitInput {
   std::vector<FitClip> clips;
   FitCase options;
-  std::map<std::string, double> truth = {};  ///< as FitInput::truth, by addresses of the joint problem
+  std::vector<std::vector<Scene>> stages = {};  ///< of each of `options.stages`, the clips' scenes
+  std::map<std::string, double> truth = {};     ///< as FitInput::truth, by addresses of the joint problem
   /// As FitInput::evaluations; of several clips each has a folder of its name in there.
   std::string evaluations = {};
   bool anew = false;

@@ -208,6 +208,10 @@ std::string answer_text(const FitResult& result) {
           " forward runs; residual " + number(result.rms_px) + " px rms over " +
           std::to_string(result.num_observations) + " observations of " + std::to_string(result.num_tracks) +
           " tracks, reduced chi-square " + number(result.reduced_chi_square) + ".\n";
+  for (std::size_t i = 0; i < result.stages.size(); ++i)
+    text += "Stage " + std::to_string(i + 1) + " before (" + result.stages[i].change +
+            "): " + std::to_string(result.stages[i].forward_runs) + " runs, " + result.stages[i].status +
+            ".\n";
   text += measured_lines(result);
   if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";

@@ -71,6 +71,16 @@ void shift_fields(Archive& field, Record& d) {
 }
 
 template <class Archive, class Record>
+void stage_fields(Archive& field, Record& s) {
+  field("change", s.change);
+  field("status", s.status);
+  field("forward_runs", s.forward_runs);
+  field("cost", s.cost);
+  field("seconds", s.seconds);
+  field("values", s.values);
+}
+
+template <class Archive, class Record>
 void further_fields(Archive& field, Record& v) {
   field("name", v.name);
   field("ratios", v.ratios);
@@ -152,6 +162,7 @@ void result_fields(Archive& field, Record& r) {
   field("forward_seconds", r.forward_seconds);
   field("history", r.history);
   field.optional("systematic", r.systematic);
+  field.optional("stages", r.stages);
   field.optional("further_views", r.further_views);
   field.optional("measured", r.measured);
   field.optional("starts", r.starts);
@@ -220,6 +231,11 @@ class Writer {
   static Json json(const SystematicShift& v) {
     Writer w;
     shift_fields(w, v);
+    return std::move(w.out);
+  }
+  static Json json(const FittedStage& v) {
+    Writer w;
+    stage_fields(w, v);
     return std::move(w.out);
   }
   static Json json(const FurtherView& v) {
@@ -339,6 +355,10 @@ class Reader {
   static void read(const Json& j, SystematicShift& v, const std::string& where) {
     Reader r(j, where);
     shift_fields(r, v);
+  }
+  static void read(const Json& j, FittedStage& v, const std::string& where) {
+    Reader r(j, where);
+    stage_fields(r, v);
   }
   static void read(const Json& j, FurtherView& v, const std::string& where) {
     Reader r(j, where);

@@ -50,6 +50,14 @@ struct FurtherView {
   std::vector<double> ratios;
 };
 
+/// A cheaper fit before the fit (stages.h).
+struct FittedStage {
+  std::string change, status;  ///< what it did otherwise; converged | max_evaluations | failed: ...
+  int forward_runs = 0;
+  double cost = 0, seconds = 0;
+  std::vector<double> values;  ///< where it ended, internal units
+};
+
 struct FitIteration {
   int iteration = 0, evaluations = 0;
   double cost = 0, gradient_norm = 0, step_norm = 0, seconds = 0;
@@ -130,6 +138,7 @@ struct FitResult {
   std::vector<std::string> notes;        ///< schemes, settings, warnings
   std::vector<FitResidual> residuals;
   std::vector<FurtherView> further_views;
+  std::vector<FittedStage> stages;
   std::vector<FittedMeasurement> measured;  ///< empty where nothing was measured besides
   /// Files as found from the folder of results, or absolute. scene_file is what the fit began from.
   std::string scene_file, footage_file, tracks_file, camera_file;

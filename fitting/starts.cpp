@@ -156,7 +156,8 @@ std::vector<VectorXd> start_points(const Objective& objective, const StartOption
   require(options.starts > 0 && options.local_fits > 0 && options.spread > 0,
           "start_points: starts, local fits and spread are positive");
   const VectorXd lower = objective.lower(), upper = objective.upper();
-  std::vector<VectorXd> points = {objective.initial().cwiseMax(lower).cwiseMin(upper)};
+  const VectorXd first = options.first.size() > 0 ? options.first : objective.initial();
+  std::vector<VectorXd> points = {first.cwiseMax(lower).cwiseMin(upper)};
   points.resize(options.starts, points[0]);
   std::mt19937_64 random(options.seed);
   int base = 1;
@@ -215,12 +216,13 @@ StartsOutcome search_from_starts(Objective& screen, Objective& objective, const 
   return found;
 }
 
-StartsOutcome fit_from_starts(const JointFitInput& input, JointProblem& problem, const LocalFit& local_fit,
-                              const FitObserver& observer) {
+StartsOutcome fit_from_starts(const JointFitInput& input, JointProblem& problem, const VectorXd& first,
+                              const LocalFit& local_fit, const FitObserver& observer) {
   const StartOptions options{.starts = input.options.starts,
                              .local_fits = input.options.local_fits,
                              .spread = input.options.start_spread,
-                             .seed = input.options.seed};
+                             .seed = input.options.seed,
+                             .first = first};
   if (options.starts == 1) return search_from_starts(problem, problem, options, local_fit);
   JointFitInput early = input;
   early.options.last_frame = last_screened_frame(problem, input.options);

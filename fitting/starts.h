@@ -27,9 +27,10 @@ struct StartOptions {
   int local_fits = 3;  ///< searches at most, that from the case's own start among them
   double spread = 1;   ///< half width of the box in units u_k
   unsigned seed = 1;
+  VectorXd first = {};  ///< where start 0 is instead of the objective's initial point; empty: there
 };
 
-/// The first is the objective's initial point; transformed, within the bounds. Throws ContractError unless
+/// The first is options.first or the objective's initial point; transformed, within the bounds. Throws ContractError unless
 /// starts, local_fits and spread are positive.
 std::vector<VectorXd> start_points(const Objective& objective, const StartOptions& options);
 
@@ -60,8 +61,9 @@ StartsOutcome search_from_starts(Objective& screen, Objective& objective, const 
 
 /// The same for a fit: screens on the early frames (`/fit/screen_frames`) in a problem of its own, with a log
 /// of its own in the folder `screen` of the fit's. Runs told to the observer are counted through.
-StartsOutcome fit_from_starts(const JointFitInput& input, JointProblem& problem, const LocalFit& local_fit,
-                              const FitObserver& observer);
+/// `first` is start 0, about which the others lie.
+StartsOutcome fit_from_starts(const JointFitInput& input, JointProblem& problem, const VectorXd& first,
+                              const LocalFit& local_fit, const FitObserver& observer);
 
 /// Starts, optima, and sentences about them into the result, whose parameters are those of the winner.
 /// `widening` is that of its deviations: another optimum is as good where it costs less than 2 w² more.

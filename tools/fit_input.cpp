@@ -156,6 +156,8 @@ std::optional<fitting::JointFitInput> fit_input(const fitting::Case& c, const fi
                                .options = options,
                                .truth = {},
                                .evaluations = (fs::path(folder) / "evaluations").string()};
+  for (const fitting::StageCase& stage : options.stages)
+    input.stages.push_back(fitting::scenes_of_stage(c, stage));
   const std::vector<Scene> scenes = fitting::scenes_of(c);
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     fitting::FitClip& clip = input.clips.emplace_back();

@@ -156,6 +156,21 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
   return job;
 }
 
+namespace {
+
+void draw_tracks(const TrackJob& job, const fitting::TrackSet& tracks, const std::string& folder,
+                 Progress& progress) {
+  progress.stage("drawing the tracks over the footage", 0);
+  for (const char* name : {"overlay.mp4", "overlay.avi"})  // of earlier tracks, perhaps by another encoder
+    if (fs::is_regular_file(in(folder, name))) fs::remove(in(folder, name));
+  fitting::FrameSource again(job.footage);
+  const fitting::OverlayReport overlay =
+      fitting::write_overlay(again, tracks, job.options.camera, in(folder, "overlay.mp4"));
+  write_overlay_picture(overlay.path, 2 * overlay.frames / 3, in(folder, "overlay.png"));
+}
+
+}  // namespace
+
 ExitCode track_footage(const TrackJob& job, const std::string& folder, int threads, Progress& progress,
                        std::ostream& out) {
   cv::setNumThreads(threads);
@@ -195,15 +210,16 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
   record.update(tracks_record(footage, settings, job.of_case, job.is_other_video || settings != job.of_case));
   write_file(in(folder, "track.json"), unfinished_tracks_record().dump() + "\n");
   fitting::write_tracks(result.tracks, in(folder, "tracks.csv"));
-  write_file(in(folder, "track.json"), record.dump(2) + "\n");
-
-  progress.stage("drawing the tracks over the footage", 0);
-  for (const char* name : {"overlay.mp4", "overlay.avi"})  // of earlier tracks, perhaps by another encoder
-    if (fs::is_regular_file(in(folder, name))) fs::remove(in(folder, name));
-  fitting::FrameSource again(job.footage);
-  const fitting::OverlayReport overlay =
-      fitting::write_overlay(again, result.tracks, options.camera, in(folder, "overlay.mp4"));
-  write_overlay_picture(overlay.path, 2 * overlay.frames / 3, in(folder, "overlay.png"));
+  // The record comes last: where it is whole, the pictures are there too, also after a kill. Tracks without
+  // pictures, for want of an encoder, are whole all the same.
+  const auto finish = [&] { write_file(in(folder, "track.json"), record.dump(2) + "\n"); };
+  try {
+    draw_tracks(job, result.tracks, folder, progress);
+  } catch (...) {
+    finish();
+    throw;
+  }
+  finish();
 
   out << in(folder, "tracks.csv") << ": " << fitting::summary(result.report) << '\n';
   if (returned) out << fitting::summary(*returned) << '\n';

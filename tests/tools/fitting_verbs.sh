@@ -46,7 +46,7 @@ import json, sys
 fit = json.load(open(sys.argv[1] + "/fit.json"))
 for key in ("seconds", "forward_seconds"):
     del fit[key]
-for step in fit["history"] + fit["systematic"]:
+for step in fit["history"] + fit["systematic"] + fit.get("stages", []):
     del step["seconds"]
 print(json.dumps(fit, indent=1))
 for name in ("residuals.csv", "fitted_scene.json", "answer.txt"):

@@ -133,6 +133,8 @@ std::optional<RecoveryDraw> run_recovery_draw(const RecoveryTwin& twin, const Dr
                             .tracks = *tracks,
                             .options = c.fit,
                             .truth = fitting::read_truth(setup.folder + "/truth.json", setup.fit)};
+    for (const fitting::StageCase& stage : c.fit.stages)
+      input.stages.push_back(fitting::scenes_of_stage(c, stage)[0]);
     fitting::FitObserver observer;
     observer.should_stop = [&progress] { return progress.interrupted(); };
     const fitting::FitResult result = fitting::run_fit(input, observer);
