@@ -1,5 +1,6 @@
 #include "fitting/stages.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -22,6 +23,16 @@ JointFitInput stage_input(const JointFitInput& input, std::size_t s) {
   }
   if (!stage.evaluations.empty()) stage.evaluations += "/stage_" + std::to_string(s + 1);
   return stage;
+}
+
+/// Name of a parameter that is at its bound; empty when none is. From there a fit hardly returns: a strength
+/// that has gone to nothing has no derivative.
+std::string at_bound(const JointProblem& problem, const VectorXd& t) {
+  const VectorXd lower = problem.lower(), upper = problem.upper();
+  for (int k = 0; k < problem.num_parameters(); ++k)
+    if (std::min(t[k] - lower[k], upper[k] - t[k]) < 1e-6 * (upper[k] - lower[k]))
+      return problem.variables()[static_cast<std::size_t>(k)].name;
+  return {};
 }
 
 }  // namespace
@@ -50,10 +61,15 @@ StagesOutcome run_stages(const JointFitInput& input, const JointProblem& problem
       stage.forward_runs = coarse.forward_runs();
       found.was_stopped = coarse.was_stopped();
       if (search.best().size() > 0) {
-        found.start = search.all(search.best());
+        const VectorXd end = search.all(search.best());
+        const std::string stuck = at_bound(coarse, end);
         stage.cost = search.best_cost();
         stage.status =
             outcome.status == OptimiserOutcome::Status::converged ? "converged" : "max_evaluations";
+        if (stuck.empty())
+          found.start = end;
+        else
+          stage.status += "; not followed, since " + stuck + " ended at a bound";
       } else {
         stage.status = "failed: " + coarse.last_failure();
       }

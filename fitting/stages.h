@@ -2,7 +2,7 @@
 // before ended, the fit itself where the last one did, so that most of the way is gone at a fraction of its cost.
 //
 // A stage has the tracks, parameters, bounds and priors of the fit; its scene differs by settings. A stage that fails
-// hands on what it was given.
+// or ends at a bound hands on what it was given.
 //
 // Tests: tests/fitting/stages_test.cpp
 #pragma once
