@@ -210,6 +210,16 @@ std::pair<std::string, std::vector<Setting>> read_truth(const LocatedJson& locat
   return {has_scene ? truth["scene"].get<std::string>() : base.scene, settings};
 }
 
+/// A camera of its own has its own image and unit too.
+ViewCase read_view(const Case& c, const json& j, const std::string& pointer) {
+  const auto text = [&j](const char* key) { return j.value(key, ""); };
+  ViewCase view{"", pointer, c.camera, text("footage"), text("tracks"), c.camera_image, c.camera_unit};
+  if (j.contains("camera")) view.camera = j["camera"], view.camera_image = "", view.camera_unit.reset();
+  if (j.contains("camera_image")) view.camera_image = j["camera_image"];
+  if (j.contains("camera_unit")) view.camera_unit = j["camera_unit"].get<double>();
+  return view;
+}
+
 void read_clips(const LocatedJson& located, Case& c) {
   const json& root = located.json;
   for (const char* key : {"footage", "tracks", "measurements"})
@@ -235,18 +245,15 @@ void read_clips(const LocatedJson& located, Case& c) {
     else if (root.contains("truth"))  // that of the case, as if the clip were the case
       std::tie(clip.truth_scene, clip.truth_settings) =
           read_truth(located, "/truth", {clip.scene, clip.scene_settings, own});
-    const auto view = [&](const json& v) {
-      const auto text = [&v](const char* key) { return v.value(key, ""); };
-      return ViewCase{"", v.value("camera", c.camera), text("footage"), text("tracks")};
-    };
     clip.measurements = j.value("measurements", "");
     if (j.contains("cameras"))
-      for (const json& v : j["cameras"]) {
-        clip.views.push_back(view(v));
-        if (j["cameras"].size() > 1) clip.views.back().name = v["name"];
+      for (std::size_t v = 0; v < j["cameras"].size(); ++v) {
+        const json& seen = j["cameras"][v];
+        clip.views.push_back(read_view(c, seen, pointer + "/cameras/" + std::to_string(v)));
+        if (j["cameras"].size() > 1) clip.views.back().name = seen["name"];
       }
     else
-      clip.views.push_back(view(j));
+      clip.views.push_back(read_view(c, j, pointer));
     c.clips.push_back(std::move(clip));
   }
 }

@@ -102,7 +102,10 @@ struct FitCase {
 /// What one camera saw of a clip.
 struct ViewCase {
   std::string name;                     ///< empty where it is the clip's only one
+  std::string pointer;                  ///< where the case has it, "/clips/0/cameras/1"
   std::string camera, footage, tracks;  ///< as those of Case
+  std::string camera_image;             ///< as that of Case
+  std::optional<double> camera_unit;    ///< mm, as that of Case
 };
 
 /// One of several experiments with the same skin.
@@ -125,6 +128,7 @@ struct Case {
   std::string camera;                 ///< path of the camera file; empty: the automatic one of `render`
   std::string camera_image;           ///< when `camera` is COLMAP's: which image it took; empty: the only one
   std::optional<double> camera_unit;  ///< mm, of COLMAP's unit of length
+  std::string view_pointer;           ///< of the view that this is the case of, "/clips/0"; else empty
   std::string footage, tracks;        ///< paths as given
   std::string measurements;           ///< path (measurements.h); empty: none
   RenderCase render;

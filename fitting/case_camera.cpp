@@ -7,14 +7,15 @@ namespace rhytid::fitting {
 
 Camera read_case_camera(const Case& c) {
   require(!c.camera.empty(), "read_case_camera: the case names no camera");
+  const std::string at = c.file + ": " + c.view_pointer;
   if (!is_colmap(c.camera)) {
     if (!c.camera_image.empty() || c.camera_unit)
-      throw InputError(c.file + ": /camera_image and /camera_unit", "a camera " + c.camera,
+      throw InputError(at + "/camera_image and /camera_unit", "a camera " + c.camera,
                        "a folder with cameras.txt and images.txt of COLMAP, or none of the two");
     return read_camera(c.camera);
   }
   if (!c.camera_unit)
-    throw InputError(c.file + ": /camera_unit", "nothing",
+    throw InputError(at + "/camera_unit", "nothing",
                      "the length of COLMAP's unit, as \"12.5 mm\": its files have no unit");
   return read_colmap_camera(c.camera, c.camera_image, *c.camera_unit);
 }

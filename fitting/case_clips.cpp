@@ -96,7 +96,9 @@ Case case_of_view(const Case& c, int clip, int view) {
   one.scene = k.scene, one.scene_settings = k.scene_settings;
   one.truth_scene = k.truth_scene, one.truth_settings = k.truth_settings;
   one.measurements = k.measurements;
-  one.camera = k.views[view].camera, one.footage = k.views[view].footage, one.tracks = k.views[view].tracks;
+  const ViewCase& seen = k.views[view];
+  one.camera = seen.camera, one.camera_image = seen.camera_image, one.camera_unit = seen.camera_unit;
+  one.view_pointer = seen.pointer, one.footage = seen.footage, one.tracks = seen.tracks;
   return one;
 }
 

@@ -7,6 +7,25 @@
 namespace rhytid::fitting {
 namespace {
 
+/// Which image of COLMAP a camera is, and the length of its unit; also of clips and their views at `at`.
+Rule colmap_image(const std::string& at, const std::string& rival) {
+  Rule rule{.pointer = at + "/camera_image",
+            .type = RuleType::string,
+            .rival = rival,
+            .doc = "With COLMAP: the image that the camera took, as in images.txt; default: the only one."};
+  if (at.empty()) rule.fallback = "";
+  return rule;
+}
+
+Rule colmap_unit(const std::string& at, const std::string& rival) {
+  return {.pointer = at + "/camera_unit",
+          .dimension = dimension::length,
+          .min = 0,
+          .min_is_open = true,
+          .rival = rival,
+          .doc = "With COLMAP: how long its unit is, which its files do not know."};
+}
+
 std::vector<Rule> file_rules() {
   return {
       {.pointer = "", .type = RuleType::object, .is_required = true, .doc = "A case."},
@@ -24,15 +43,8 @@ std::vector<Rule> file_rules() {
        .doc = "OpenCV camera (`rhytid calibrate`), or the folder of COLMAP's cameras.txt and images.txt; "
               "default: "
               "the automatic one."},
-      {.pointer = "/camera_image",
-       .type = RuleType::string,
-       .fallback = "",
-       .doc = "With COLMAP: the image that the camera took, as in images.txt; default: the only one."},
-      {.pointer = "/camera_unit",
-       .dimension = dimension::length,
-       .min = 0,
-       .min_is_open = true,
-       .doc = "With COLMAP: how long its unit is, which its files do not know."},
+      colmap_image("", ""),
+      colmap_unit("", ""),
       {.pointer = "/footage", .type = RuleType::string, .fallback = "", .doc = "Video file."},
       {.pointer = "/tracks",
        .type = RuleType::string,
@@ -79,7 +91,9 @@ std::vector<Rule> clip_rules() {
       {.pointer = clip + "/camera",
        .type = RuleType::path,
        .rival = "cameras",
-       .doc = "OpenCV camera; default: that of the case."},
+       .doc = "OpenCV camera or COLMAP's folder; default: that of the case, with its image and unit."},
+      colmap_image(clip, "cameras"),
+      colmap_unit(clip, "cameras"),
       {.pointer = clip + "/footage", .type = RuleType::string, .rival = "cameras", .doc = "Video file."},
       {.pointer = clip + "/tracks",
        .type = RuleType::string,
@@ -93,7 +107,11 @@ std::vector<Rule> clip_rules() {
        .doc = "Where several cameras saw the clip, in step with each other: one entry for each."},
       {.pointer = view, .type = RuleType::object, .doc = "What one camera saw."},
       {.pointer = view + "/name", .type = RuleType::name, .is_required = true, .doc = "Of the camera."},
-      {.pointer = view + "/camera", .type = RuleType::path, .doc = "OpenCV camera."},
+      {.pointer = view + "/camera",
+       .type = RuleType::path,
+       .doc = "OpenCV camera or COLMAP's folder; default: that of the case, with its image and unit."},
+      colmap_image(view, ""),
+      colmap_unit(view, ""),
       {.pointer = view + "/footage", .type = RuleType::string, .doc = "Video file."},
       {.pointer = view + "/tracks", .type = RuleType::string, .doc = "Observations, CSV."},
       {.pointer = clip + "/truth",

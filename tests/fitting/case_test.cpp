@@ -245,6 +245,31 @@ TEST_F(CaseTest, ClipsResolveTheTruthOfTheCase) {
   EXPECT_EQ(clips("")[1].truth_scene, "");
 }
 
+TEST_F(CaseTest, ViewsHaveImagesOfColmapOfTheirOwn) {
+  const Case c = load_case(write("case.json", R"({
+    "scene": "scene.json", "camera": "colmap", "camera_image": "a.jpg", "camera_unit": "2 cm",
+    "clips": [{"name": "left"},
+              {"name": "up", "camera_image": "b.jpg"},
+              {"name": "down", "cameras": [{"name": "near", "camera_image": "c.jpg", "camera_unit": 5},
+                                           {"name": "far", "camera": "far.yaml"}]}]})"));
+  const Case left = case_of_view(c, 0, 0), up = case_of_view(c, 1, 0), near = case_of_view(c, 2, 0),
+             far = case_of_view(c, 2, 1);
+  EXPECT_EQ(left.camera_image, "a.jpg");
+  EXPECT_EQ(left.camera_unit, 20.0);
+  EXPECT_EQ(up.camera_image, "b.jpg");
+  EXPECT_EQ(up.camera_unit, 20.0);
+  EXPECT_EQ(near.camera, left.camera);
+  EXPECT_EQ(near.camera_image, "c.jpg");
+  EXPECT_EQ(near.camera_unit, 5.0);
+  EXPECT_EQ(far.camera, (folder_ / "far.yaml").string());
+  EXPECT_EQ(far.camera_image, "") << "a camera of its own";
+  EXPECT_FALSE(far.camera_unit);
+  EXPECT_EQ(near.view_pointer, "/clips/2/cameras/0");
+  EXPECT_THAT(error_of(R"({"scene": "scene.json",
+                           "clips": [{"name": "a", "camera_image": "a.jpg", "cameras": [{"name": "x"}]}]})"),
+              HasSubstr("cameras"));
+}
+
 TEST_F(CaseTest, WrongClipsAreRefused) {
   const auto clips = [this](const std::string& list, const std::string& more = "") {
     return error_of("{\"scene\": \"scene.json\", \"clips\": [" + list + "]" + more + "}");
