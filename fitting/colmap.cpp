@@ -14,6 +14,7 @@
 #include "sim/core/parse_number.h"
 #include "sim/output/atomic_file.h"
 #include "sim/output/text.h"
+#include "sim/scene/located_json.h"
 #include "sim/scene/nearest.h"
 
 namespace rhytid::fitting {
@@ -71,6 +72,20 @@ class Lines {
       return true;
     }
     return false;
+  }
+  /// Throws InputError unless the line has points, "X Y POINT3D_ID" each, or nothing.
+  void check_points() const {
+    std::size_t count = 0, at = line_.find_first_not_of(" \t");
+    bool are_numbers = true;
+    for (; at != std::string::npos && are_numbers; ++count) {
+      const std::size_t end = std::min(line_.find_first_of(" \t", at), line_.size());
+      double value = 0;
+      are_numbers = parse(std::string_view(line_).substr(at, end - at), value);
+      at = line_.find_first_not_of(" \t", end);
+    }
+    if (!are_numbers || count % 3 != 0)
+      refuse("'" + shown_text(line_.substr(0, 40)) + "'",
+             "the points of the image above, X Y POINT3D_ID each, or an empty line");
   }
   const std::vector<std::string>& words() const { return words_; }
   /// Everything from the word `index` on.
@@ -140,7 +155,7 @@ std::vector<Image> read_images(const std::string& file) {
     image.camera = lines.whole(8, "CAMERA_ID");
     image.name = lines.rest(9);
     images.push_back(image);
-    lines.next();  // its points
+    if (lines.next()) lines.check_points();
   }
   return images;
 }

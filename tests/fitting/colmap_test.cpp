@@ -133,6 +133,8 @@ TEST_F(Colmap, IsTheCameraOfACase) {
     return std::string("accepted");
   };
   EXPECT_THAT(refused(), HasSubstr("case.json: /camera_unit: got nothing"));
+  c.view_pointer = "/clips/1";
+  EXPECT_THAT(refused(), HasSubstr("case.json: /clips/1/camera_unit: got nothing"));
   c.camera_unit = 10;
   const std::string out = folder_ + "/out";
   std::filesystem::create_directories(out);
@@ -169,6 +171,12 @@ TEST_F(Colmap, RefusesMalformedFilesWithTheirLine) {
   EXPECT_THAT(images("1 1 0 0 0 0 0 nan 1 a.jpg\n"), HasSubstr("TZ 'nan'"));
   EXPECT_THAT(images("1 1 0 0 0 0 0 2 1.5 a.jpg\n"), HasSubstr("a whole number"));
   EXPECT_THAT(images(""), HasSubstr("no images"));
+  // Without the lines of points every second image would be taken for points.
+  EXPECT_THAT(images("1 1 0 0 0 0 0 2 1 a.jpg\n2 1 0 0 0 0 0 2 1 b.jpg\n"),
+              AllOf(HasSubstr("images.txt:4: got '2 1 0"), HasSubstr("points of the image above")));
+  EXPECT_THAT(images("1 1 0 0 0 0 0 2 1 a.jpg\n1 2 3 4\n"), HasSubstr("images.txt:4: got '1 2 3 4'"));
+  EXPECT_EQ(images("1 1 0 0 0 0 0 2 1 a.jpg\n1.5 2 -1  4 5e1 6 \n"), "accepted");
+  EXPECT_EQ(images("1 1 0 0 0 0 0 2 1 a.jpg"), "accepted");
   std::filesystem::remove(folder_ + "/cameras.txt");
   EXPECT_FALSE(is_colmap(folder_));
   EXPECT_THROW(read(), InputError);
