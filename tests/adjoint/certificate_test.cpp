@@ -180,6 +180,28 @@ TEST(Certificate, NoticesAWrongErrorBar) {
   EXPECT_GE(calls, 4);  // of the gradient, of its repetition and of two loose runs at the least
 }
 
+// A tighter run that cannot be compared leaves figure, verdict and what they are of.
+TEST(Certificate, AnErrorBarThatATighterRunCannotTestKeepsItsSentence) {
+  const CertifiedCase& c = small_case();
+  CertificateOptions options;
+  int loose = 0;
+  options.adjoint = [&](const Model& model, const VectorXd& native, const Trajectory& run,
+                        const auto&... rest) {
+    AdjointResult result = adjoint_sweep(model, native, run, rest...);
+    if (&run == &c.run) return result;
+    if (++loose == 2) throw GradientError("no factor");
+    result.residual_error *= 3;
+    return result;
+  };
+  const CertificateReport report = certify(c.scene_model, c.run, *c.output, c.weights, options);
+  EXPECT_EQ(loose, 2);
+  const CertificateCheck& bar = check(report, "error bar");
+  EXPECT_EQ(bar.verdict, Verdict::fail);
+  EXPECT_GT(bar.figure, 1.5);
+  EXPECT_NE(bar.sentence.find("adjoint times residual says"), std::string::npos) << bar.sentence;
+  EXPECT_NE(bar.sentence.find("a tighter run has no gradient: no factor"), std::string::npos) << bar.sentence;
+}
+
 // Both sweeps wrong in the same way: duality cannot see it, the Taylor test must.
 TEST(Certificate, NoticesConsistentlyWrongSweeps) {
   const CertifiedCase& c = small_case();
