@@ -10,6 +10,7 @@
 #include <sstream>
 #include <vector>
 
+#include "sim/core/digest.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 
@@ -248,6 +249,18 @@ Camera read_camera(const std::string& path) {
     throw InputError(path, "malformed content (" + e.err + ")", "a camera in OpenCV YAML");
   }
   return camera;
+}
+
+std::string camera_digest(const Camera& camera) {
+  Digest d;
+  d.text(camera.name);
+  d.number(camera.width);
+  d.number(camera.height);
+  d.matrix(camera.intrinsics);
+  for (const double x : camera.distortion) d.number(x);
+  d.matrix(camera.rotation);
+  d.matrix(camera.translation);
+  return d.hex();
 }
 
 void write_camera(const Camera& camera, const std::string& path) {

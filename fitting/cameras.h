@@ -56,6 +56,9 @@ struct Camera {
 /// R and t mean the camera frame is the world frame. Throws InputError naming file and key.
 Camera read_camera(const std::string& path);
 
+/// Digest of everything in it, by which saved work knows its camera, whatever file or folder it came from.
+std::string camera_digest(const Camera& camera);
+
 /// Writes what read_camera() reads, all digits, under a temporary name that is renamed when complete.
 /// Throws InputError when the file cannot be written.
 void write_camera(const Camera& camera, const std::string& path);

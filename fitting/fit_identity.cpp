@@ -18,18 +18,6 @@ std::string scene_digest(const Scene& scene, const FitProblem& problem) {
   return d.hex();
 }
 
-std::string camera_digest(const Camera& camera) {
-  Digest d;
-  d.text(camera.name);
-  d.number(camera.width);
-  d.number(camera.height);
-  d.matrix(camera.intrinsics);
-  for (const double x : camera.distortion) d.number(x);
-  d.matrix(camera.rotation);
-  d.matrix(camera.translation);
-  return d.hex();
-}
-
 std::string tracks_digest(const TrackSet& tracks) {
   Digest d;
   for (const Track& track : tracks.tracks) {

@@ -8,7 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "sim/output/atomic_file.h"
+#include "fitting/colmap.h"
+#include "sim//output/atomic_file.h"
 #include "sim/scene/load.h"
 #include "sim/scene/parameter.h"
 #include "tests/support/paths.h"
@@ -268,6 +269,26 @@ TEST_F(RecoveryBench, ADrawIsWhatTheVerbsDoAndIsDoneOnce) {
   const Outcome other = recovery("a", {"--draws", "1", "--set", "/render/noise=3"});
   EXPECT_THAT(other.err, HasSubstr("tiny, as_is: 0 of 1 draw kept"));
   EXPECT_NE(rows("a")[1], rows("b")[1]);
+}
+
+// A camera of COLMAP is two files: a pose that changed is another study too.
+TEST_F(RecoveryBench, KnowsACameraOfColmapByWhatItSees) {
+  fitting::Camera camera;
+  camera.name = "a.png";
+  camera.intrinsics << 400, 0, 79.5, 0, 400, 59.5, 0, 0, 1;
+  camera.rotation = Vec3(1, -1, -1).asDiagonal();
+  camera.translation = {0, 0, 60};
+  camera.width = 160, camera.height = 120;
+  fs::create_directories(at("colmap"));
+  fitting::write_colmap_cameras({camera}, at("colmap"), 1);
+  const std::vector<std::string> arguments = {
+      "--draws", "1", "--set", "/camera=" + at("colmap"), "--set", "/camera_unit=1 mm"};
+  const Outcome first = recovery("a", arguments);
+  ASSERT_EQ(first.code, 0) << first.err;
+  EXPECT_THAT(recovery("a", arguments).err, HasSubstr("tiny, as_is: 1 of 1 draw kept"));
+  camera.translation = {0.5, 0, 60};
+  fitting::write_colmap_cameras({camera}, at("colmap"), 1);
+  EXPECT_THAT(recovery("a", arguments).err, HasSubstr("tiny, as_is: 0 of 1 draw kept"));
 }
 
 TEST_F(RecoveryBench, RefusesWhatItCannotRepeat) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 
+#include "fitting/case_camera.h"
 #include "fitting/case_rules.h"
 #include "sim/core/digest.h"
 #include "sim/core/error.h"
@@ -161,7 +162,7 @@ class RecoveryBenchmark : public Benchmark {
     for (const std::string& setting : settings_) depends_on.text(setting);
     depends_on.text(study.variant);
     files.text(content_digest(fit.model()) + content_digest(truth.model()));
-    if (!c.camera.empty()) files.text(file_digest(c.camera));
+    if (!c.camera.empty()) files.text(fitting::camera_digest(fitting::read_case_camera(c)));
     study.scenes = scenes.hex(), study.depends_on = depends_on.hex(), study.files = files.hex();
   }
 
