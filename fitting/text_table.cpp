@@ -43,7 +43,7 @@ TextTable::TextTable(const std::string& path) : path_(path), text_(read_file(pat
     header_ = std::string(line.substr(0, 200));
     delimiter_ = ' ';
     for (const char c : {'\t', ';', ','})
-      if (line.find(c) != std::string_view::npos) delimiter_ = c;
+      if (delimiter_ == ' ' && line.find(c) != std::string_view::npos) delimiter_ = c;
     std::vector<std::string_view> fields;
     split(line, &fields);
     for (const std::string_view field : fields) names_.emplace_back(field);

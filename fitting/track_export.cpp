@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <map>
 
 #include "sim/core/error.h"
@@ -34,21 +35,21 @@ std::string plain_table(const TrackSet& set) {
     for (const Observation& o : track.observations) {
       text += std::to_string(o.frame) + "," + std::to_string(track.id) + "," + track.camera + "," +
               exact_text(o.time_s) + ",";
-      text += o.status == TrackStatus::ok
-                  ? joined({o.pixel.x(), o.pixel.y(), deviation(o.covariance), o.correlation})
-                  : ",,,";
+      text += o.status == TrackStatus::ok ? joined({o.pixel.x(), o.pixel.y(), deviation(o.covariance)}) +
+                                                "," + (o.correlation != 0 ? exact_text(o.correlation) : "")
+                                          : ",,,";
       text += std::string(",") + to_string(o.status) + "\n";
     }
   return text;
 }
 
-/// Tracks without correlations have 0 there; as a GAMMA it would say that nothing matched.
-bool has_correlations(const TrackSet& set) {
+/// Tracks without correlations have 0 there; as a ZNCC or GAMMA it would say that nothing matched.
+bool have_correlations(const TrackSet& set) {
   for (const Track& track : set.tracks)
     for (const Observation& o : track.observations)
-      if (o.status == TrackStatus::ok && o.frame != track.observations.front().frame && o.correlation != 0)
-        return true;
-  return false;
+      if (o.status == TrackStatus::ok && o.frame != track.observations.front().frame && o.correlation == 0)
+        return false;
+  return true;
 }
 
 std::string dice_row(const Track& track, const Observation& o, bool has_gamma) {
@@ -62,22 +63,29 @@ std::string dice_row(const Track& track, const Observation& o, bool has_gamma) {
   return line + (is_ok ? ",0\n" : ",8\n");
 }
 
-std::string opencorr_row(const Track& track, const Observation& o) {
+/// Without ZNCC a point that is lost has no displacement.
+std::string opencorr_row(const Track& track, const Observation& o, bool has_zncc) {
   const Observation& first = track.observations.front();
   const bool is_ok = o.status == TrackStatus::ok;
-  const Vec2 moved = is_ok ? Vec2(o.pixel - first.pixel) : Vec2::Zero();
-  return joined({first.pixel.x(), first.pixel.y(), moved.x(), moved.y(), moved.x(), moved.y(),
-                 is_ok ? o.correlation : -1, 0, 0, 0, 0, 0, 0, 0, 0}) +
-         ",\n";
+  const double nothing = has_zncc ? 0 : std::numeric_limits<double>::quiet_NaN();
+  const Vec2 moved = is_ok ? Vec2(o.pixel - first.pixel) : Vec2(nothing, nothing);
+  std::string line = joined({first.pixel.x(), first.pixel.y(), moved.x(), moved.y(), moved.x(), moved.y()});
+  if (has_zncc) line += "," + joined({is_ok ? o.correlation : -1});
+  return line + ",0,0,0,0,0,0,0,0,\n";
 }
 
-constexpr const char* kDiceHeader =
-    "***\n*** Displacements since frame 0, written by rhytid convert\n"
-    "*** Incremental correlation: false\n"
-    "*** Coordinates given with (0,0) as upper left corner of image, x positive right, y positive down\n***\n"
-    "SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA,";
-constexpr const char* kOpenCorrHeader =
-    "x,y,u,v,u0,v0,ZNCC,iteration,convergence,feature,exx,eyy,exy,subset_rx,subset_ry,\n";
+/// `reference`: the frame of the tracks that displacements count from.
+std::string header(TrackFormat format, int reference, bool has_correlations) {
+  if (format == TrackFormat::opencorr)
+    return std::string("x,y,u,v,u0,v0,") + (has_correlations ? "ZNCC," : "") +
+           "iteration,convergence,feature,exx,eyy,exy,subset_rx,subset_ry,\n";
+  return "***\n*** Displacements since frame " + std::to_string(reference) +
+         " of the tracks, here frame 0, written by rhytid convert\n"
+         "*** Incremental correlation: false\n"
+         "*** Coordinates given with (0,0) as upper left corner of image, x positive right, y positive down\n"
+         "***\nSUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA," +
+         (has_correlations ? "GAMMA," : "") + "STATUS_FLAG\n";
+}
 
 void write_tables(const TrackSet& set, TrackFormat format, const std::string& folder,
                   TrackExportReport* report) {
@@ -92,7 +100,8 @@ void write_tables(const TrackSet& set, TrackFormat format, const std::string& fo
     first_frame = is_any ? std::min(first_frame, begin) : begin;
     is_any = true;
   }
-  const bool has_gamma = has_correlations(set);
+  report->reference_frame = first_frame;
+  const bool has_correlations = have_correlations(set);
   std::map<int, std::string> frames;
   for (const Track& track : set.tracks) {
     const bool is_referred = !track.observations.empty() && track.observations.front().frame == first_frame &&
@@ -104,12 +113,10 @@ void write_tables(const TrackSet& set, TrackFormat format, const std::string& fo
     ++report->tracks;
     for (const Observation& o : track.observations) {
       if (o.frame == first_frame) continue;
-      std::string& text = frames[o.frame];
-      if (text.empty())
-        text = format == TrackFormat::dice
-                   ? std::string(kDiceHeader) + (has_gamma ? "GAMMA,STATUS_FLAG\n" : "STATUS_FLAG\n")
-                   : kOpenCorrHeader;
-      text += format == TrackFormat::dice ? dice_row(track, o, has_gamma) : opencorr_row(track, o);
+      std::string& text = frames[o.frame - first_frame];
+      if (text.empty()) text = header(format, first_frame, has_correlations);
+      text += format == TrackFormat::dice ? dice_row(track, o, has_correlations)
+                                          : opencorr_row(track, o, has_correlations);
     }
   }
   for (const auto& [frame, text] : frames) {

@@ -1,6 +1,7 @@
 #include "fitting/track_import.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <unordered_map>
@@ -10,6 +11,7 @@
 #include "fitting/text_table.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
+#include "sim/scene/located_json.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -44,6 +46,13 @@ bool is_dice_success(int status) {
 }
 
 constexpr int kDiceReset = 26;
+
+/// What tracks.csv can hold.
+bool is_camera_name(const std::string& name) {
+  return !name.empty() && name.find_first_of(",\r\n") == std::string::npos;
+}
+
+constexpr const char* kCameraName = "a camera's name without commas and line ends";
 
 /// Points by subset number, or by their coordinates in the reference, in the order of their appearance.
 class PointSet {
@@ -105,29 +114,31 @@ class Importer {
   TrackSet dice(const std::vector<std::string>& files) {
     const bool is_by_subset = TextTable(files.front()).find({"FRAME"}) >= 0;
     const std::vector<NumberedFile> numbered = number_files(files, report_.notes);
-    // DICe numbers its files from 0 or 1; a file 0 of the reference with itself is frame 0.
-    bool has_self = false;
-    std::vector<char> is_self;
+    // DICe numbers its files as the pictures; a file of the reference with itself is frame 0.
+    std::optional<int> self;  // its number
     for (const NumberedFile& file : numbered) {
       const TextTable head(file.path);
       if (dice_fact(head, "Incremental correlation") == "true")
         throw InputError(file.path, "displacements from picture to picture (Incremental correlation: true)",
                          "displacements since the reference picture");
       const std::string reference = dice_fact(head, "Reference image");
-      is_self.push_back(!reference.empty() && reference != "(from array)" &&
-                        reference == dice_fact(head, "Deformed image"));
-      has_self = has_self || is_self.back();
+      if (is_by_subset || reference.empty() || reference == "(from array)" ||
+          reference != dice_fact(head, "Deformed image"))
+        continue;
+      if (self) throw InputError(file.path, "a second file of the reference with itself", "one");
+      self = file.number;
+      report_.notes.push_back(file.path + " is the reference with itself: frame 0");
     }
+    if (is_by_subset) refuse_first_frame("the column FRAME says what frame it is");
+    if (self) refuse_first_frame("the file of the reference with itself is frame 0");
     for (std::size_t i = 0; i < numbered.size(); ++i) {
-      if (is_by_subset) {
-        read_dice(numbered[i].path, static_cast<int>(i), -1, numbered[i].number);
-      } else if (is_self[i]) {
-        report_.notes.push_back(numbered[i].path + " is the reference with itself: frame 0");
-      } else {
-        const int first = has_self ? numbered.front().number : first_frame(numbered.front().number);
-        read_dice(numbered[i].path, static_cast<int>(i), numbered[i].number - numbered.front().number + first,
-                  -1);
-      }
+      const NumberedFile& file = numbered[i];
+      if (file.number == self) continue;
+      const int frame = self ? file.number - *self : frame_of(file, numbered.front());
+      if (!is_by_subset && frame < 0)
+        throw InputError(file.path, "a number before that of the reference with itself",
+                         "files of pictures behind the reference");
+      read_dice(file.path, static_cast<int>(i), is_by_subset ? -1 : frame, is_by_subset ? file.number : -1);
     }
     return tracks();
   }
@@ -138,28 +149,58 @@ class Importer {
                        "how sure a displacement is, px per axis: OpenCorr's tables do not say");
     const std::vector<NumberedFile> numbered = number_files(files, report_.notes);
     for (std::size_t i = 0; i < numbered.size(); ++i)
-      read_opencorr(numbered[i].path, static_cast<int>(i),
-                    numbered[i].number - numbered.front().number + first_frame(numbered.front().number));
+      read_opencorr(numbered[i].path, static_cast<int>(i), frame_of(numbered[i], numbered.front()));
     return tracks();
   }
 
   TrackSet csv(const std::vector<std::string>& files) {
     if (files.size() != 1) throw InputError(files[1], "a second file", "one file with all frames of a csv");
+    refuse_first_frame("the column frame says what frame it is");
     return read_csv(files.front());
   }
 
  private:
-  int first_frame(int lowest_number) const {
-    return options_.first_frame.value_or(std::max(lowest_number, 1));
+  /// Where no file says which one the reference is, the first one is not it.
+  int frame_of(const NumberedFile& file, const NumberedFile& first) const {
+    return file.number - first.number + options_.first_frame.value_or(std::max(first.number, 1));
+  }
+
+  void refuse_first_frame(const std::string& why) const {
+    if (options_.first_frame)
+      throw InputError("--first-frame", std::to_string(*options_.first_frame), "nothing: " + why);
   }
 
   void lose(const std::string& reason) { ++report_.lost[reason]; }
 
   /// Whether a correlation is good enough; counts the loss.
   bool accepts(double correlation) {
+    if (correlation > 1 + 1e-6) {  // rounded
+      lose("correlation above 1");
+      return false;
+    }
     if (correlation >= options_.min_correlation) return true;
     lose("correlation below " + short_text(options_.min_correlation));
     return false;
+  }
+
+  /// DICe's STATUS_FLAG; none when it is no number.
+  static std::optional<int> dice_status(const TextTable& table, int column) {
+    const double value = table.number(column);
+    if (std::isnan(value)) return std::nullopt;
+    if (!(std::abs(value) <= 1e6 && value == std::floor(value))) table.refuse(column, "a whole number");
+    return static_cast<int>(value);
+  }
+
+  /// What a csv calls its points; nothing is ok.
+  static TrackStatus csv_status(const TextTable& table, int column) {
+    std::string word(table.text(column));
+    std::transform(word.begin(), word.end(), word.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (word.empty()) return TrackStatus::ok;
+    for (const TrackStatus status :
+         {TrackStatus::ok, TrackStatus::occluded, TrackStatus::lost, TrackStatus::outside})
+      if (word == to_string(status)) return status;
+    table.refuse(column, "ok, lost, occluded, outside, or nothing, which is ok");
   }
 
   void read_dice(const std::string& path, int file, int frame, int subset) {
@@ -193,17 +234,19 @@ class Importer {
       row.displacement = {table.number(u), table.number(v)};
       row.sigma = options_.sigma ? *options_.sigma : table.number(sigma);
       const double said = sigma >= 0 ? table.number(sigma) : row.sigma;
-      const int flag = status >= 0 ? static_cast<int>(table.number(status)) : 0;
+      const std::optional<int> flag = status >= 0 ? dice_status(table, status) : 0;
       row.renews = flag == kDiceReset;
       const double correlation = gamma >= 0 ? 1 - table.number(gamma) / 2 : 0;
-      if (!is_dice_success(flag))
-        lose("STATUS_FLAG " + std::to_string(flag));
+      if (flag && !is_dice_success(*flag))
+        lose("STATUS_FLAG " + std::to_string(*flag));
       else if (match >= 0 && table.number(match) < 0)
         lose("MATCH below 0");
-      else if (!row.displacement.allFinite() || std::isnan(said) || std::isnan(correlation))
+      else if (!flag || !row.displacement.allFinite() || std::isnan(said) || !std::isfinite(correlation))
         lose("a number that is not finite");
       else if (said < 0)
         lose("SIGMA below 0");
+      else if (gamma >= 0 && correlation > 1)
+        lose("GAMMA below 0");
       else if (!(row.sigma > 0) || !std::isfinite(row.sigma))
         table.refuse(sigma, "a deviation above 0 px, since DICe estimated none; or --sigma");
       else
@@ -225,7 +268,7 @@ class Importer {
       row.displacement = {table.number(u), table.number(v)};
       row.sigma = *options_.sigma;
       const double correlation = zncc >= 0 ? table.number(zncc) : 0;
-      if (!row.displacement.allFinite() || std::isnan(correlation))
+      if (!row.displacement.allFinite() || !std::isfinite(correlation))
         lose("a number that is not finite");
       else
         row.is_ok = zncc < 0 || accepts(correlation);
@@ -298,23 +341,24 @@ class Importer {
     std::map<std::pair<std::string, int>, Track> by_track;
     while (table.next()) {
       const std::string seen_by = camera >= 0 ? std::string(table.text(camera)) : options_.camera;
-      if (seen_by.empty()) table.refuse(camera, "a camera's name");
+      if (!is_camera_name(seen_by)) table.refuse(camera, kCameraName);
       Track& track = by_track[{seen_by, table.index(id)}];
       track.id = table.index(id), track.camera = seen_by;
       const auto is_empty = [&table](int column) { return table.text(column).empty(); };
-      const bool is_lost =
-          (is_empty(x) && is_empty(y)) || (status >= 0 && table.text(status) != "ok" && !is_empty(status));
+      const TrackStatus said = status >= 0 ? csv_status(table, status) : TrackStatus::ok;
+      const bool is_lost = said != TrackStatus::ok || (is_empty(x) && is_empty(y));
       Observation o = observation(table.index(frame), Vec2::Zero(), 1);
       if (time >= 0) o.time_s = table.finite(time);
       ++report_.observations;
       if (is_lost)
-        lose("no position");
+        lose(said != TrackStatus::ok ? to_string(said) : "no position");
       else
         o.pixel = {table.number(x), table.number(y)};
-      const double correlation = corr >= 0 && !is_lost ? table.number(corr) : 0;
-      bool is_ok = !is_lost && o.pixel.allFinite() && !std::isnan(correlation);
+      const bool has_correlation = corr >= 0 && !is_lost && !is_empty(corr);
+      const double correlation = has_correlation ? table.number(corr) : 0;
+      bool is_ok = !is_lost && o.pixel.allFinite() && std::isfinite(correlation);
       if (!is_lost && !is_ok) lose("a number that is not finite");
-      if (is_ok && corr >= 0) is_ok = accepts(correlation);
+      if (is_ok && has_correlation) is_ok = accepts(correlation);
       if (is_ok) {
         const double deviation = options_.sigma ? *options_.sigma / std::sqrt(2.0) : table.number(sigma);
         if (!(deviation > 0) || !std::isfinite(deviation)) table.refuse(sigma, "a deviation above 0 px");
@@ -322,7 +366,7 @@ class Importer {
         o.correlation = std::clamp(correlation, -1.0, 1.0);
         ++report_.ok;
       }
-      o.status = is_ok ? TrackStatus::ok : TrackStatus::lost;
+      o.status = is_ok ? TrackStatus::ok : said != TrackStatus::ok ? said : TrackStatus::lost;
       track.observations.push_back(o);
     }
     return sorted(path, by_track);
@@ -364,6 +408,8 @@ void check(const TrackImportOptions& options) {
     throw InputError("--sigma", std::to_string(*options.sigma), "a deviation above 0 px");
   if (!(options.frame_rate >= 0) || !std::isfinite(options.frame_rate))
     throw InputError("--rate", std::to_string(options.frame_rate), "frames per second above 0");
+  if (!is_camera_name(options.camera))
+    throw InputError("--camera", "'" + shown_text(options.camera) + "'", kCameraName);
   require(!options.first_frame || *options.first_frame >= 1, "import_tracks: the reference is frame 0");
 }
 
@@ -418,6 +464,9 @@ TrackSet import_tracks(const std::vector<std::string>& files, const TrackImportO
   TrackSet set;
   if (report->format == TrackFormat::rhytid) {
     if (files.size() != 1) throw InputError(files[1], "a second file", "one tracks.csv");
+    if (options.first_frame)
+      throw InputError("--first-frame", std::to_string(*options.first_frame),
+                       "nothing: tracks.csv has frames");
     set = read_tracks(files.front());
     for (const Track& track : set.tracks) {
       report->observations += static_cast<long>(track.observations.size());

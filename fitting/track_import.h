@@ -14,9 +14,9 @@
 // is what a track's frames err alike (the subset of the reference), C_f = sigma_f² − C_0 what frame f errs by
 // itself. The sigma of a csv is that of a position, the first one's that which all frames err alike.
 //
-// A point whose correlation failed is lost there: a DICe STATUS_FLAG other than success, SIGMA or MATCH below
-// 0, a number that is not finite, a correlation (ZNCC; 1 − GAMMA/2) below min_correlation. Where a source says
-// none, corr is 0. DICe's STATUS_FLAG 26 renews the subset: what follows is renewed in the sense of
+// A point whose correlation failed is lost there: a DICe STATUS_FLAG other than success, SIGMA, MATCH or GAMMA
+// below 0, a number that is not finite, a correlation (ZNCC; 1 − GAMMA/2) above 1 or below min_correlation.
+// Where a source says none, corr is 0. The status of a csv is ok, lost, occluded or outside, or nothing. DICe's STATUS_FLAG 26 renews the subset: what follows is renewed in the sense of
 // observations.h.
 // Tests: tests/fitting/track_import_test.cpp
 #pragma once
@@ -44,7 +44,8 @@ struct TrackImportOptions {
   double frame_rate = 0;              ///< Hz; 0: the file must have times
   std::optional<double> sigma;        ///< px per axis, of a displacement; in place of what files say
   double min_correlation = 0.6;       ///< below it a point is lost; as the tracker's
-  /// Frame of the file with the lowest number in its name; default: that number, but at least 1.
+  /// Frame of the file with the lowest number in its name; default: that number, but at least 1. Refused where
+  /// files say which frame they are of, or DICe's reference with itself is among them, which is frame 0.
   std::optional<int> first_frame;
 };
 

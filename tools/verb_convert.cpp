@@ -82,7 +82,7 @@ class Convert : public Verb {
     app.add_option(
            "--first-frame", import_.first_frame,
            "frame of the file with the lowest number (default: that number, at least 1; the reference "
-           "is frame 0)")
+           "is frame 0); where no file says which frame it is of")
         ->option_text("N")
         ->check(CLI::Range(1, 1000000));
     app.add_option("--camera", import_.camera, "name of the camera in tracks.csv (camera)")
@@ -159,6 +159,9 @@ class Convert : public Verb {
     if (written.without_reference > 0)
       context.progress.warning(counted(written.without_reference, "track") +
                                " not seen in the first frame: left out of tables of displacements");
+    if (written.reference_frame != 0)
+      context.progress.warning("displacements are since frame " + std::to_string(written.reference_frame) +
+                               ": it is frame 0 of the tables, and their numbers count from it");
     if (written.renewed > 0)
       context.progress.warning(counted(written.renewed, "renewed template") +
                                ": what they add to the deviation is not in this format");

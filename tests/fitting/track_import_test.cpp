@@ -131,6 +131,57 @@ TEST_F(TrackImport, DiceNumbersFilesFromZeroOrOne) {
   EXPECT_THAT(refusal({f1}), HasSubstr("Incremental"));
 }
 
+// The file of the reference with itself is frame 0, whatever its number, and the others count from it.
+TEST_F(TrackImport, DiceFilesCountFromTheReferenceWithItself) {
+  const std::string rows = "0,1,1,0.5,0,0.02,0.01,0\n";
+  std::string self = kDice;
+  self.replace(self.find("b.tif"), 5, "a.tif");
+  const std::string f5 = write("DICe_solution_05.txt", self + rows),
+                    f6 = write("DICe_solution_06.txt", kDice + rows),
+                    f7 = write("DICe_solution_07.txt", kDice + rows);
+  const TrackSet set = import({f5, f6, f7});
+  ASSERT_EQ(set.tracks[0].observations.size(), 3u);
+  EXPECT_NE(set.tracks[0].at(1), nullptr);
+  EXPECT_NE(set.tracks[0].at(2), nullptr);
+  EXPECT_EQ(import({f6, f7}).tracks[0].observations.back().frame, 7);  // the reference is not among them
+  EXPECT_THAT(refusal({write("DICe_solution_04.txt", kDice + rows), f5, f6}), HasSubstr("before that of"));
+  EXPECT_THAT(refusal({f5, f6, write("DICe_solution_08.txt", self + rows)}), HasSubstr("a second file"));
+  options_.first_frame = 3;
+  EXPECT_THAT(refusal({f5, f6, f7}), HasSubstr("--first-frame: got 3, expected nothing: the file of the"));
+  EXPECT_THAT(refusal({write("t.csv", "frame,track,x,y,sigma\n0,0,1,1,1\n")}), HasSubstr("--first-frame"));
+  EXPECT_THAT(refusal({write("s_0.txt",
+                             "FRAME,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA\n"
+                             "1,319,278,0,0,0.07\n")}),
+              HasSubstr("--first-frame"));
+}
+
+// What no correlation can be and no flag says is lost or refused, never taken.
+TEST_F(TrackImport, ImpossibleCorrelationsAndFlags) {
+  const std::string good = "0,1,1,0.5,0,0.02,0.01,0\n";
+  const TrackSet set = import({write("s_1.txt", kDice + good +
+                                                    "1,2,1,0,0,0.02,-1,0\n"  // no GAMMA
+                                                    "2,3,1,0,0,0.02,0.01,nan\n"
+                                                    "3,4,1,0,0,0.02,-inf,0\n"
+                                                    "4,5,1,0,0,0.02,0.01,-1\n")});
+  EXPECT_EQ(set.tracks.size(), 1u);
+  EXPECT_EQ(report_.lost.at("GAMMA below 0"), 1);
+  EXPECT_EQ(report_.lost.at("a number that is not finite"), 2);
+  EXPECT_EQ(report_.lost.at("STATUS_FLAG -1"), 1);
+  for (const char* flag : {"0.9", "1e300", "inf"})
+    EXPECT_THAT(refusal({write("s_1.txt", kDice + good + "1,2,1,0,0,0.02,0.01," + flag + "\n")}),
+                AllOf(HasSubstr("s_1.txt:8:"), HasSubstr("got STATUS_FLAG"), HasSubstr("a whole number")));
+  options_.sigma = 0.02;
+  const auto zncc = [](const char* text) {
+    return std::string(",20,0,0,0,0,") + text + ",0,0,0,0,0,0,16,16,\n";
+  };
+  const TrackSet poi = import({write("poi_1.csv", kOpenCorr + "10" + zncc("0.9") + "20" + zncc("inf") + "30" +
+                                                      zncc("1.01") + "40" + zncc("1.0000001"))});
+  EXPECT_EQ(poi.tracks.size(), 2u);
+  EXPECT_EQ(poi.tracks[1].at(1)->correlation, 1);
+  EXPECT_EQ(report_.lost.at("correlation above 1"), 1);
+  EXPECT_EQ(report_.lost.at("a number that is not finite"), 1);
+}
+
 // The other layout of DICe: one file a subset, one row a frame.
 TEST_F(TrackImport, DiceFilesOfSubsets) {
   const std::string header =
@@ -182,6 +233,44 @@ TEST_F(TrackImport, PlainTables) {
   EXPECT_EQ(track->at(2)->status, TrackStatus::lost);
   options_.sigma = 0.4;  // of a displacement
   EXPECT_NEAR(import({path}).find("camera", 4)->at(1)->covariance(0, 0), 0.08, 1e-15);
+}
+
+TEST_F(TrackImport, WordsOfAPlainTableInAnyCase) {
+  const std::string header = "frame\ttrack\tx\ty\tsigma\tcorr\tstatus\n";
+  const TrackSet set = import({write("t.csv", header + "0\t4\t10\t20\t0.1\t\tOK\n"
+                                                       "1\t4\t11\t20\t0.1\t0.9\tOk\n"
+                                                       "2\t4\t11\t20\t0.1\t0.9\tOccluded\n"
+                                                       "3\t4\t\t\t\t\tLOST\n"
+                                                       "4\t4\t12\t20\t0.1\t0.9\t\n")});
+  const Track& track = set.tracks.at(0);
+  EXPECT_EQ(track.at(0)->status, TrackStatus::ok);
+  EXPECT_EQ(track.at(0)->correlation, 0) << "it says none";
+  EXPECT_EQ(track.at(1)->status, TrackStatus::ok);
+  EXPECT_EQ(track.at(2)->status, TrackStatus::occluded);
+  EXPECT_EQ(track.at(3)->status, TrackStatus::lost);
+  EXPECT_EQ(track.at(4)->status, TrackStatus::ok);
+  EXPECT_THAT(refusal({write("t.csv", header + "0\t4\t10\t20\t0.1\t1\tgood\n")}),
+              HasSubstr("t.csv:2:17: got status 'good', expected ok, lost, occluded"));
+}
+
+TEST_F(TrackImport, NamesOfCamerasFitIntoTracksCsv) {
+  const std::string path = write("t.csv", "frame,track,x,y,sigma\n0,0,1,1,1\n");
+  for (const char* name : {"", "left,1", "left\n", "a\rb"}) {
+    options_.camera = name;
+    EXPECT_THAT(refusal({path}), HasSubstr("--camera: got '")) << name;
+  }
+  options_.camera = "left";
+  EXPECT_EQ(import({path}).tracks[0].camera, "left");
+  EXPECT_THAT(refusal({write("u.csv", "frame;track;x;y;sigma;camera\n0;0;1;1;1;a,b\n")}),
+              HasSubstr("u.csv:2:11: got camera 'a,b', expected a camera's name without commas"));
+}
+
+// Of tab, semicolon and comma the first that the header has, in this order.
+TEST_F(TrackImport, DelimiterIsTheFirstOfTheThree) {
+  EXPECT_EQ(
+      import({write("t.csv", "frame;track;x;y;sigma;where, roughly\n0;3;1;2;1;chin, left\n")}).tracks[0].id,
+      3);
+  EXPECT_EQ(import({write("u.csv", "frame\ttrack\tx\ty\tsigma\ta;b\n0\t5\t1\t2\t1\t0\n")}).tracks[0].id, 5);
 }
 
 TEST_F(TrackImport, SaysWhereAndWhatIsMissing) {
@@ -267,6 +356,37 @@ TEST_F(TrackImport, ExportedTracksReadBack) {
         EXPECT_NEAR(found->correlation, expected, 1e-12);
       }
   }
+  // Tracks that know no correlation come back as they were, in every format.
+  for (Track& track : set.tracks)
+    for (Observation& o : track.observations) o.correlation = 0;
+  for (const TrackFormat format : {TrackFormat::dice, TrackFormat::opencorr, TrackFormat::csv}) {
+    SCOPED_TRACE(to_string(format));
+    options_.sigma = format == TrackFormat::opencorr ? std::optional<double>(std::sqrt(8e-4)) : std::nullopt;
+    const TrackSet back = import(export_tracks(set, format, folder_.string()).files);
+    ASSERT_EQ(back.tracks.size(), set.tracks.size());
+    for (const Track& track : set.tracks)
+      for (const Observation& o : track.observations) {
+        const Observation* found = back.find("camera", track.id)->at(o.frame);
+        ASSERT_NE(found, nullptr);
+        EXPECT_EQ(found->status, o.status);
+        if (o.status == TrackStatus::ok) {
+          EXPECT_LT((found->pixel - o.pixel).norm(), 1e-12);
+        }
+      }
+  }
+  options_.sigma.reset();
+  // Of frames 3 to 15 the reference is the third: it is frame 0 of the tables, and they say so.
+  for (Track& track : set.tracks)
+    for (Observation& o : track.observations) o.frame += 3;
+  const TrackExportReport late = export_tracks(set, TrackFormat::dice, folder_.string());
+  EXPECT_EQ(late.reference_frame, 3);
+  EXPECT_THAT(late.files.front(), HasSubstr("DICe_solution_0001.txt"));
+  std::ifstream text(late.files.front());
+  const std::string head((std::istreambuf_iterator<char>(text)), {});
+  EXPECT_THAT(head, HasSubstr("Displacements since frame 3 of the tracks, here frame 0"));
+  const TrackSet counted = import(late.files);
+  EXPECT_EQ(counted.tracks[1].observations.size(), 13u);
+  EXPECT_LT((counted.tracks[1].at(2)->pixel - set.tracks[1].at(5)->pixel).norm(), 1e-12);
   set.tracks[3].observations[0].status = TrackStatus::lost;
   EXPECT_EQ(export_tracks(set, TrackFormat::dice, folder_.string()).without_reference, 1);
   set.tracks[5].camera = "other";
