@@ -1,6 +1,7 @@
 #include "fitting/board_search.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <set>
 #include <utility>
@@ -10,6 +11,8 @@
 
 namespace rhytid::fitting {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// The same board seen upright or lying.
 BoardSize lying(const BoardSize& size) {
@@ -42,10 +45,11 @@ BoardSize agreed_size(const std::vector<CalibrationPhotograph>& photographs) {
                    "the size of the board, as --board 9x6");
 }
 
-/// The size of most pictures; the others lose their boards.
+/// The size of most pictures with a board; the others lose their boards.
 void agree_on_picture(const std::vector<cv::Size>& sizes, BoardSearch* search) {
   std::map<std::pair<int, int>, int> counts;
-  for (const cv::Size& size : sizes) ++counts[{size.width, size.height}];
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    if (!search->photographs[i].board.corners.empty()) ++counts[{sizes[i].width, sizes[i].height}];
   const auto most = std::max_element(counts.begin(), counts.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
   std::tie(search->width, search->height) = most->first;
@@ -64,8 +68,12 @@ std::optional<BoardSearch> find_boards(const std::vector<std::string>& files,
                                        const std::optional<BoardSize>& wanted,
                                        const std::function<bool(int done)>& progress) {
   std::set<std::string> seen;
-  for (const std::string& file : files)
-    if (!seen.insert(file).second) throw InputError(file, "this photograph twice", "each once");
+  for (const std::string& file : files) {
+    std::error_code ignored;  // what is wrong with the file is said when it is read
+    const fs::path path = fs::weakly_canonical(file, ignored);
+    if (!seen.insert(ignored ? file : path.string()).second)
+      throw InputError(file, "this photograph twice", "each once");
+  }
   BoardSearch search;
   std::vector<cv::Size> sizes;
   for (std::size_t i = 0; i < files.size(); ++i) {

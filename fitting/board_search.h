@@ -14,7 +14,7 @@ namespace rhytid::fitting {
 struct BoardSearch {
   std::vector<CalibrationPhotograph> photographs;  ///< as given; those without a board say why
   BoardSize board;
-  int width = 0, height = 0;  ///< px, of most photographs
+  int width = 0, height = 0;  ///< px, of most photographs with a board
 };
 
 /// Looks for the board of size `wanted` in all files; without a size for that which most photographs show, at

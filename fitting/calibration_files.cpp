@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "fitting/utf8.h"
 #include "sim/output/plot_canvas.h"
 #include "sim/output/text.h"
 
@@ -163,7 +164,7 @@ std::string calibration_json(const Calibration& c) {
     j["photographs"].push_back(std::move(item));
   }
   j["warnings"] = c.warnings;
-  return j.dump(1) + "\n";
+  return j.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n";  // names of files
 }
 
 std::string calibration_svg(const Calibration& c) {
@@ -190,8 +191,8 @@ std::string calibration_svg(const Calibration& c) {
   for (const CalibrationPhotograph& p : c.photographs) {
     const std::string colour = p.is_used ? hex(palette_colour(index++)) : "#999999";
     svg.rectangle(x, y - 9, 10, 10, "fill=\"" + colour + "\" stroke=\"none\"");
-    std::string name = base_name(p.file);
-    if (name.size() > 24) name = "..." + name.substr(name.size() - 21);
+    std::string name = valid_utf8(base_name(p.file));
+    if (name.size() > 24) name = "..." + utf8_tail(name, 21);
     svg.text(x + 16, y, name + (p.is_used ? ", rms " + short_text(p.rms_px, 3) + " px" : ", left out"));
     y += kLine;
     std::string arrows, feet;  // a dot where an arrow begins

@@ -15,9 +15,11 @@
 #include <set>
 
 #include "fitting/pose.h"
+#include "fitting/utf8.h"
 #include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
+#include "sim/scene/located_json.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -186,6 +188,7 @@ std::vector<Landmark> read_landmarks(const std::string& path, double sigma,
     };
     Landmark l;
     l.name = text("name");
+    if (!is_utf8(l.name)) throw InputError(where, "name '" + shown_text(l.name) + "'", "text in UTF-8");
     if (l.name.empty() || !names.insert(l.name).second)
       throw InputError(where, "name '" + l.name + "'", "a name of its own for every landmark");
     l.pixel = {number("x_px"), number("y_px")};
@@ -249,22 +252,24 @@ PoseEstimate estimate_pose(const std::vector<Landmark>& landmarks, const Camera&
         "a pose tilted by " + short_text(kDegrees * found->angle, 2) +
         " degrees against this one explains the landmarks nearly as well: add some that "
         "lie nearer to or farther from the camera than the others");
+  const double scale = std::sqrt(estimate.reduced_chi_square);
+  bool is_one_wrong = false;
   if (n >= 5) {
     std::vector<double> scale_without;
     estimate.left_out = leave_one_out(landmarks, camera, found->best, scale_without);
     // With 5 landmarks the other 4 have two degrees of freedom left: too few to accuse the fifth.
     const auto worst = std::min_element(scale_without.begin(), scale_without.end()) - scale_without.begin();
-    const double scale = std::sqrt(estimate.reduced_chi_square);
     const std::size_t w = static_cast<std::size_t>(worst);
-    if (n >= 6 && scale > 2 && scale > 3 * scale_without[w])
+    is_one_wrong = n >= 6 && scale > 2 && scale > 3 * scale_without[w];
+    if (is_one_wrong)
       estimate.doubts.push_back("'" + landmarks[w].name + "' lies " + short_text(estimate.left_out[w], 2) +
                                 " px from where the others put it, which agree among themselves: check its "
                                 "vertex and pixel");
-    else if (scale > 2)
-      estimate.doubts.push_back("the landmarks are off by " + short_text(scale, 2) +
-                                " times their deviation: the mesh is not this face, the camera's calibration "
-                                "is wrong, or the stated deviation is too small");
   }
+  if (!is_one_wrong && scale > 2)
+    estimate.doubts.push_back("the landmarks are off by " + short_text(scale, 2) +
+                              " times their deviation: the mesh is not this face, the camera's calibration "
+                              "is wrong, or the stated deviation is too small");
   return estimate;
 }
 

@@ -46,7 +46,7 @@ struct PoseEstimate {
 
 /// Reads the file described above; `vertex` gives the place of a vertex, or throws InputError whose text says
 /// what is expected. `sigma` is for landmarks that have none of their own. Throws InputError
-/// "file:line: ..." for what cannot be read, for a name given twice and for no landmark.
+/// "file:line: ..." for what cannot be read, for a name given twice or not in UTF-8, and for no landmark.
 std::vector<Landmark> read_landmarks(const std::string& path, double sigma,
                                      const std::function<Vec3(long)>& vertex);
 

@@ -142,8 +142,11 @@ class Calibrate : public Verb {
     fs::create_directories(output_, error);
     if (error || !fs::is_directory(output_))
       throw InputError("--output", "'" + output_ + "'", "a folder that can be written");
-    write_file(in("calibration.json"), fitting::calibration_json(calibration));
-    write_file(in("calibration.svg"), fitting::calibration_svg(calibration));
+    // All texts before the first file: what fails leaves no half of the results.
+    const std::string json = fitting::calibration_json(calibration),
+                      svg = fitting::calibration_svg(calibration);
+    write_file(in("calibration.json"), json);
+    write_file(in("calibration.svg"), svg);
     fitting::write_camera(calibration.camera, in("camera.yaml"));
   }
 

@@ -230,8 +230,12 @@ class RegisterVerb final : public Verb {
     std::vector<unsigned char> png;
     if (!cv::imencode(".png", picture, png))
       throw InputError(folder, "no picture", "a picture that can be written");
+    // All texts before the first file: what fails leaves no half of the results.
+    const std::string json =
+        pose_json(landmarks, pose).dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+        "\n";
     write_file(folder + "/registration.png", std::string(png.begin(), png.end()));
-    write_file(folder + "/registration.json", pose_json(landmarks, pose).dump(1) + "\n");
+    write_file(folder + "/registration.json", json);
     fitting::write_camera(pose.camera, folder + "/camera.yaml");
     context.out << pose_text(landmarks, pose) << "written to " << folder
                 << ": camera.yaml (for /camera of the case), registration.json, registration.png\n";

@@ -14,6 +14,7 @@
 
 #include "fitting/board_search.h"
 #include "fitting/calibration_files.h"
+#include "fitting/utf8.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
@@ -335,6 +336,22 @@ TEST(Calibration, SaysWhatIsPoor) {
   EXPECT_LT(bare->reach, 0.8);
 }
 
+// Names of files need not be UTF-8, and those that are may not be cut within a character.
+TEST(Calibration, AnyNameOfAFileGivesValidTexts) {
+  auto photographs = corners_with_noise(truth({}), 3, 0.5, 0.1, 1);
+  photographs[0].file = "fl\xfcgel.jpg";
+  photographs[1].file = "x";
+  for (int i = 0; i < 12; ++i) photographs[1].file += "\xc3\xa4";  // the last 21 of 25 bytes begin within one
+  const auto c = calibrate(photographs, 640, 480, {});
+  ASSERT_TRUE(c);
+  const auto json = nlohmann::json::parse(calibration_json(*c));
+  EXPECT_EQ(json["photographs"][0]["file"], "fl\xef\xbf\xbdgel.jpg");
+  EXPECT_EQ(json["photographs"][1]["file"], photographs[1].file);
+  const std::string svg = calibration_svg(*c);
+  EXPECT_TRUE(is_utf8(svg));
+  EXPECT_THAT(svg, AllOf(HasSubstr("fl\xef\xbf\xbdgel.jpg"), HasSubstr("...\xc3\xa4")));
+}
+
 TEST(Calibration, StopsWhenTold) {
   CalibrationOptions options;
   options.progress = [](int done, int) { return done < 2; };
@@ -354,6 +371,10 @@ TEST_F(CalibrationFiles, RefusesWhatCannotBeUsed) {
   EXPECT_THAT(refusal([&] { read_photograph(file("text.png")); }), HasSubstr("no picture"));
   EXPECT_THAT(refusal([&] { read_photograph(folder_.string()); }), HasSubstr("a folder"));
   EXPECT_THAT(refusal([&] { find_boards({files[0], files[0]}, kBoard, {}); }), HasSubstr("twice"));
+  EXPECT_THAT(refusal([&] {
+                find_boards({files[0], (folder_ / "." / "0.png").string()}, kBoard, {});
+              }),
+              HasSubstr("twice"));
   EXPECT_THAT(
       refusal([&] {
         find_boards({files[0]}, BoardSize{10, 7}, {});
@@ -367,6 +388,14 @@ TEST_F(CalibrationFiles, RefusesWhatCannotBeUsed) {
   cv::imwrite(file("large.png"), cv::Mat(600, 800, CV_8U, cv::Scalar(90)));
   const auto mixed = find_boards({files[0], files[1], file("large.png")}, kBoard, {});
   EXPECT_THAT(mixed->photographs[2].reason, HasSubstr("800 x 600 px, the others 640 x 480"));
+  // Pictures of something else have no say in the size, however many they are.
+  for (const char* name : {"large2.png", "large3.png"})
+    std::filesystem::copy_file(file("large.png"), file(name));
+  const auto few = find_boards(
+      {file("large.png"), files[0], file("large2.png"), files[1], file("large3.png")}, kBoard, {});
+  EXPECT_EQ(few->width, 640);
+  EXPECT_EQ(few->photographs[1].board.corners.size(), 54u);
+  EXPECT_THAT(few->photographs[0].reason, HasSubstr("800 x 600 px, the others 640 x 480"));
 }
 
 }  // namespace

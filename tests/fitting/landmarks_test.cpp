@@ -112,6 +112,18 @@ TEST(Landmarks, AnotherFaceIsDoubted) {
   EXPECT_GT(pose.reduced_chi_square, 9);
 }
 
+// Four leave two degrees of freedom, enough to see that they are off by far more than their deviation.
+TEST(Landmarks, FourThatDoNotFitAreDoubted) {
+  std::vector<Landmark> list = landmarks(4, 30, 7, 0.5);
+  EXPECT_TRUE(estimate_pose(list, lens(), "test").doubts.empty());
+  list[2].pixel += Vec2(30, -25);
+  const PoseEstimate pose = estimate_pose(list, lens(), "test");
+  EXPECT_GT(pose.reduced_chi_square, 4);
+  EXPECT_TRUE(pose.left_out.empty());
+  ASSERT_FALSE(pose.doubts.empty());
+  EXPECT_THAT(pose.doubts.back(), HasSubstr("times their deviation"));
+}
+
 // Flat and far away: two tilts explain them, and the estimate says so.
 TEST(Landmarks, TheOtherTiltOfAFlatSetIsNamed) {
   Camera far = posed();
@@ -190,6 +202,9 @@ TEST(Landmarks, FileIsReadAndItsErrorsNamed) {
   EXPECT_THAT(message("name,x,y_px,vertex\na,1,2,3\n"), HasSubstr(":1: got column 'x'"));
   EXPECT_THAT(message(header + "a,nan,2,3\n"), HasSubstr("x_px 'nan'"));
   EXPECT_THAT(message(""), HasSubstr("no landmark"));
+  EXPECT_EQ(read(header + "Nasenfl\xc3\xbcgel,1,2,3\n")[0].name, "Nasenfl\xc3\xbcgel");
+  EXPECT_THAT(message(header + "a,1,2,3\nNasenfl\xfcgel,1,2,3\n"),
+              testing::AllOf(HasSubstr(path + ":3: got name 'Nasenfl"), HasSubstr("expected text in UTF-8")));
   std::filesystem::remove(path);
 }
 

@@ -82,6 +82,12 @@ for name, exact, most in (("fx", 500, 5), ("fy", 500, 5), ("cx", 160, 3), ("cy",
 assert c["rms_px"] < 0.25 and [q["used"] for q in c["photographs"]] == [True] * 6 + [False]
 PYTHON
 grep -qE 'origin at pixel \([0-9.]+, [0-9.]+\), camera (19|20|21)[0-9]\.[0-9] mm from it' out.txt || fail "extrinsic: $(cat out.txt)"
+# Names of files need not be UTF-8.
+cp b0.pgm $'fl\xfcgel.pgm'
+expect 0 '^written: l/camera.yaml' calibrate b[1-5].pgm $'fl\xfcgel.pgm' --board 7x5 -o l
+written l camera.yaml calibration.json calibration.svg
+python3 -c 'import json; json.load(open("l/calibration.json", encoding="utf-8")); open("l/calibration.svg", encoding="utf-8").read()' ||
+  fail "calibration.json or calibration.svg is not UTF-8"
 
 # Tracks.
 head='SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA,GAMMA,STATUS_FLAG'
@@ -89,6 +95,7 @@ printf '***\n%s\n3,10,20,0.5,0,0.02,0.01,0\n4,30,20,0,0,-1,-1,8\n' $head >d_1.tx
 printf '***\n%s\n3,10,20,1.5,0,0.02,0.01,0\n4,30,20,2,0,0.02,0.01,4\n' $head >d_2.txt
 expect 2 'error: --rate: got nothing' convert d_1.txt d_2.txt -o t
 expect 2 'error: nothing.csv' convert nothing.csv -o t
+expect 2 "error: --camera: got '', expected a camera's name" convert d_1.txt d_2.txt --rate 25 --camera '' -o t
 sed 's/0.5,0,/half,0,/' d_1.txt >bad_1.txt
 expect 2 "error: bad_1.txt:3:9: got DISPLACEMENT_X 'half', expected a number" convert bad_1.txt --rate 25 -o t
 [ ! -e t ] || fail "refused commands left $(ls t)"
