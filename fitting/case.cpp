@@ -348,6 +348,10 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
     const json& stage = root["fit"]["stages"][i];
     c.fit.stages.push_back(
         {settings_at(located, pointer + "/settings"), stage["last_frame"], stage["max_evaluations"]});
+    const int last = c.fit.stages.back().last_frame;
+    if (last > 0 && (last < c.fit.first_frame || (c.fit.last_frame > 0 && last > c.fit.last_frame)))
+      throw InputError(located.where(pointer + "/last_frame") + ": " + pointer + "/last_frame",
+                       std::to_string(last), "0 or a frame that the fit compares");
     try {
       (void)scenes_of_stage(c, c.fit.stages.back());
     } catch (const InputError& error) {

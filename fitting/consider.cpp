@@ -4,9 +4,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <set>
 
 #include "fitting/fit_logs.h"
 #include "sim/core/error.h"
+#include "sim/scene/parameter.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -44,18 +46,38 @@ std::vector<FitParameter> considered_parameters(const JointFitInput& input) {
     for (const FitParameter& p : *input.options.consider) add(p);
     return list;
   }
+  struct Held {
+    std::string address, clip;
+    double value;
+  };
+  std::vector<Held> held;
+  std::set<std::string> apart;  // addresses that are not one parameter of all clips
   for (const FitClip& clip : input.clips)
-    for (const ColliderScene& collider : clip.scene.colliders)
-      if (collider.friction && collider.friction->coefficient > 0) {
-        FitParameter p;
-        p.address = "/colliders/" + collider.name + "/friction/coefficient";
-        p.prior_sigma = kFrictionSigma;
-        add(p);
-      }
+    for (const ColliderScene& collider : clip.scene.colliders) {
+      if (!collider.friction || !(collider.friction->coefficient > 0)) continue;
+      const std::string address = "/colliders/" + collider.name + "/friction/coefficient";
+      const bool is_fitted_here = std::any_of(
+          input.options.parameters.begin(), input.options.parameters.end(), [&](const FitParameter& p) {
+            return p.address == address && (p.clip.empty() || p.clip == clip.name);
+          });
+      for (const Held& other : held)
+        if (other.address == address && other.value != collider.friction->coefficient) apart.insert(address);
+      if (is_fitted_here)
+        apart.insert(address);
+      else
+        held.push_back({address, clip.name, collider.friction->coefficient});
+    }
+  for (const Held& h : held) {
+    FitParameter p;
+    p.address = h.address;
+    if (apart.contains(h.address)) p.clip = h.clip;
+    p.prior_sigma = kFrictionSigma;
+    add(p);
+  }
   return list;
 }
 
-std::vector<SystematicShift> considered_shifts(const JointFitInput& input, const JointProblem& problem,
+std::vector<SystematicShift> considered_shifts(const JointFitInput& input, JointProblem& problem,
                                                const VectorXd& t, const FitProblem::Linearised& linearised,
                                                const MatrixXd& basis, const FitObserver& observer) {
   const std::vector<FitParameter> held = considered_parameters(input);
@@ -64,6 +86,16 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, const
   JointFitInput wide = input;
   for (FitParameter p : held) {
     p.prior_sigma.reset();
+    for (int c = 0; c < problem.num_clips(); ++c) {
+      // As it was in the fit's run: penalties follow the gauge modulus when that is fitted.
+      const Scene scene = problem.clip(c).parametrisation().scene(problem.of_clip(c, t));
+      const std::vector<ParameterSpec> known = all_parameters(scene);
+      const bool has_it = std::any_of(known.begin(), known.end(),
+                                      [&](const ParameterSpec& spec) { return spec.address == p.address; });
+      if ((!p.clip.empty() && p.clip != problem.name(c)) || !has_it) continue;
+      p.initial = get_parameter(scene, p.address);
+      break;
+    }
     wide.options.parameters.push_back(std::move(p));
   }
   if (!wide.evaluations.empty()) wide.evaluations += "/considered";
@@ -78,6 +110,9 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, const
     all.head(n) = t;
     const auto at = considered.linearised(all);
     if (considered.was_stopped()) return {};
+    const VectorXd &there = considered.evaluate(all).residuals, &here = problem.evaluate(t).residuals;
+    const bool is_same_run =
+        at && there.size() == here.size() && (there - here).norm() <= 1e-6 * (1 + here.norm());
     for (std::size_t h = 0; h < held.size(); ++h) {
       const Eigen::Index column = n + static_cast<Eigen::Index>(h);
       const FitVariable& v = considered.variables()[static_cast<std::size_t>(column)];
@@ -90,8 +125,9 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, const
         found.failure = considered.last_failure();
       else if (std::fabs(used - v.initial) > 1e-9 * std::max(1e-12, std::fabs(v.initial)))
         found.failure = "the scene's value lies outside the usual bounds of this parameter";
-      else if (at->jacobian.rows() != linearised.jacobian.rows())
-        found.failure = "other tracks";
+      else if (!is_same_run)
+        found.failure =
+            "with this parameter on its own the scene is another one (the held modulus, clips that differ)";
       if (!found.failure.empty()) continue;
       const VectorXd shift =
           -sigma *

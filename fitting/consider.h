@@ -20,14 +20,15 @@ namespace rhytid::fitting {
 inline constexpr double kFrictionSigma = 0.3;
 
 /// The parameters to consider: those of the case that are not fitted, or, where the case names none, the friction
-/// coefficients of all colliders that are not; σ_h in prior_sigma.
+/// coefficients of all colliders that are not, clip by clip where clips hold different values or only some fit it; σ_h
+/// in prior_sigma.
 std::vector<FitParameter> considered_parameters(const JointFitInput& input);
 
 /// One run of every clip with one more sweep, at `t`, where the problem was last evaluated with the
 /// linearisation there. Nothing when there is nothing to consider or the observer stops it; runs are kept in,
 /// and taken from, the log of evaluations. A parameter that the scene holds outside its usual bounds, and all when
 /// the sweep fails, say so in `failure`.
-std::vector<SystematicShift> considered_shifts(const JointFitInput& input, const JointProblem& problem,
+std::vector<SystematicShift> considered_shifts(const JointFitInput& input, JointProblem& problem,
                                                const VectorXd& t, const FitProblem::Linearised& linearised,
                                                const MatrixXd& basis, const FitObserver& observer);
 

@@ -98,6 +98,12 @@ std::string measured_lines(const FitResult& result) {
   return text;
 }
 
+std::string two_digits(double x) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.2g", x);
+  return text;
+}
+
 /// The view that would help most.
 std::string further_view_line(const FitResult& result) {
   const FurtherView* best = nullptr;
@@ -114,8 +120,7 @@ std::string further_view_line(const FitResult& result) {
   std::string list;
   for (std::size_t k = 0; k < best->ratios.size(); ++k)
     if (best->ratios[k] > 0)
-      list +=
-          (list.empty() ? "" : ", ") + result.parameters[k].name + " " + number(best->ratios[k]).substr(0, 4);
+      list += (list.empty() ? "" : ", ") + result.parameters[k].name + " " + two_digits(best->ratios[k]);
   return "Of further views, " + best->name +
          " would help most: deviations from noise would be so many times what they are: " + list + ".\n";
 }

@@ -156,9 +156,6 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
     check_times(track, options_.frame_rate);
     if (motion != nullptr) {
       const Vec3 point = at.position(static_cast<int>(k), rest);
-      std::erase_if(track.observations, [&](const Observation& o) {
-        return o.frame > 0 && o.frame <= options_.frames && !motion->known[o.frame];
-      });
       for (Observation& o : track.observations)
         if (o.frame > 0 && o.frame <= options_.frames && o.status == TrackStatus::ok)
           o.covariance += motion->pixel_covariance(o.frame, point);
@@ -167,6 +164,7 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
     std::vector<const Observation*> used_observations;
     for (const Observation& o : track.observations) {
       if (o.status != TrackStatus::ok || o.frame < first || o.frame > options_.frames) continue;
+      if (motion != nullptr && !motion->known[o.frame]) continue;
       compared.frames.push_back(o.frame);
       compared.observed.push_back(o.pixel);
       used_observations.push_back(&o);

@@ -162,7 +162,9 @@ std::map<std::string, double> truth_in_gauge(const JointFitInput& input, const J
   std::map<std::string, double> truth = input.truth;
   const std::string gauge = "/skin/layers/" + problem.gauge_layer() + "/youngs_modulus";
   const auto known = truth.find(gauge);
-  if (known == truth.end() || problem.modulus_variable(problem.gauge_layer()) >= 0) return truth;
+  // Measured forces tell the scale: then a held modulus that is not the truth's is an error like any other.
+  if (problem.has_forces() || known == truth.end() || problem.modulus_variable(problem.gauge_layer()) >= 0)
+    return truth;
   const double factor = get_parameter(input.clips[0].scene, gauge) / known->second;
   if (std::fabs(factor - 1) < 1e-12) return truth;
   for (auto& [address, value] : truth)

@@ -43,12 +43,12 @@ Vec3 mean_normal(const std::vector<Vec3>& points, const Vec3& middle, const Came
   MatrixXd offsets(static_cast<Eigen::Index>(points.size()), 3);
   for (Eigen::Index i = 0; i < offsets.rows(); ++i)
     offsets.row(i) = (points[static_cast<std::size_t>(i)] - middle).transpose();
-  const Eigen::JacobiSVD<MatrixXd> svd(offsets, Eigen::ComputeThinV);
+  const Eigen::JacobiSVD<MatrixXd> svd(offsets, Eigen::ComputeFullV);
   const Vec3 normal = svd.matrixV().col(2);
   return normal.dot(camera.centre() - middle) < 0 ? Vec3(-normal) : normal;
 }
 
-/// Information of a camera that sees the compared points of a clip, by the clip's parameters.
+/// Information of a camera that sees the points that the clip's first camera saw, by the clip's parameters.
 MatrixXd information(const FitProblem& clip, const FitEvaluation& at, const MatrixXd& motion,
                      const Camera& camera) {
   const Eigen::Index n = clip.num_parameters();
@@ -63,7 +63,7 @@ MatrixXd information(const FitProblem& clip, const FitEvaluation& at, const Matr
       dr.middleRows<2>(2 * j) = -camera.projection_jacobian(x) * motion.rightCols(n).middleRows<3>(row);
       is_seen = is_seen && dr.middleRows<2>(2 * j).allFinite();
     }
-    if (!is_seen) continue;
+    if (!is_seen || clip.compared()[i].camera != 0) continue;
     const MatrixXd whitened = clip.noise()[i].weighted_jacobian(at.tracks[i], dr);
     sum += whitened.transpose() * whitened;
   }
@@ -93,19 +93,27 @@ std::vector<FurtherView> further_views(JointProblem& problem, const VectorXd& t,
         all(columns[a], columns[b]) += own(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
     return all;
   };
+  Eigen::Index first_row = 0;
   for (int c = 0; c < problem.num_clips(); ++c) {
     FitProblem& clip = problem.clip(c);
+    // All that the clip was compared with, and not its priors, which come last.
+    Eigen::Index rows = static_cast<Eigen::Index>(clip.measured().size());
+    for (const TrackNoise& noise : clip.noise()) rows += noise.num_rows();
+    const MatrixXd compared = at.jacobian.middleRows(first_row, rows);
+    first_row += clip.num_residuals();
+    const std::string of_clip = clip.name.empty() ? "" : " of clip " + clip.name;
+    add("the same once more" + of_clip, compared.transpose() * compared);
+    // Where frame 0 moves with the parameters a camera sees that too, which is not predicted here.
+    if (clip.run_options().settle || clip.compared().size() < 3) continue;
     const VectorXd own = problem.of_clip(c, t);
     const std::optional<MatrixXd> motion = clip.point_motion(own);
-    if (!motion) return {};
+    if (!motion) continue;
     const FitEvaluation& evaluation = clip.evaluate(own);
-    const std::string of_clip = clip.name.empty() ? "" : " of clip " + clip.name;
     const Camera& camera = clip.cameras()[0];
     const std::vector<Vec3> points = clip.rest_points();
     Vec3 middle = Vec3::Zero();
     for (const Vec3& x : points) middle += x / static_cast<double>(points.size());
     const Vec3 normal = mean_normal(points, middle, camera);
-    add("the same once more" + of_clip, of_all(c, information(clip, evaluation, *motion, camera)));
     // The camera's own axes: x to the right in the picture, y down. A camera that goes left turns about y.
     const Vec3 right = camera.rotation.row(0).transpose(), down = camera.rotation.row(1).transpose();
     const struct {

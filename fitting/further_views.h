@@ -18,8 +18,8 @@ namespace rhytid::fitting {
 
 /// The same clip filmed once more, and cameras at the same distance turned by 45° about the middle of the tracked
 /// points, to four sides of the first camera of each clip; left out are those from which the skin is seen
-/// at less than 20°. At `t`, where the problem was last evaluated with the linearisation `at`. Empty when the
-/// motion of points has no derivative there.
+/// at less than 20°. Cameras are not predicted where frame 0 moves with the parameters (a skin that settles) and for
+/// fewer than three points. At `t`, where the problem was last evaluated with the linearisation `at`.
 std::vector<FurtherView> further_views(JointProblem& problem, const VectorXd& t,
                                        const FitProblem::Linearised& at);
 

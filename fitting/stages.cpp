@@ -11,8 +11,14 @@ namespace rhytid::fitting {
 namespace {
 
 /// The fit of a stage, as a fit of its own without starts, stages and checks.
-JointFitInput stage_input(const JointFitInput& input, std::size_t s) {
+JointFitInput stage_input(const JointFitInput& input, const JointProblem& problem, std::size_t s) {
   JointFitInput stage = input;
+  // What the case leaves open comes from the fit's scenes, not from the stage's.
+  for (std::size_t k = 0; k < stage.options.parameters.size(); ++k) {
+    FitParameter& p = stage.options.parameters[k];
+    const FitVariable& v = problem.variables()[k];
+    p.initial = v.initial, p.lower = v.lower, p.upper = v.upper, p.transform = v.transform;
+  }
   stage.stages.clear();
   for (std::size_t c = 0; c < stage.clips.size(); ++c) stage.clips[c].scene = input.stages[s][c];
   const StageCase& given = input.options.stages[s];
@@ -45,7 +51,7 @@ StagesOutcome run_stages(const JointFitInput& input, const JointProblem& problem
   for (std::size_t s = 0; s < input.stages.size(); ++s) {
     const std::string name = "stage " + std::to_string(s + 1);
     const auto begin = std::chrono::steady_clock::now();
-    const JointFitInput own = stage_input(input, s);
+    const JointFitInput own = stage_input(input, problem, s);
     FittedStage& stage = found.stages.emplace_back();
     stage.change = input.options.stages[s].words();
     if (observer.note) observer.note(name + ": " + stage.change);
@@ -64,8 +70,10 @@ StagesOutcome run_stages(const JointFitInput& input, const JointProblem& problem
         const VectorXd end = search.all(search.best());
         const std::string stuck = at_bound(coarse, end);
         stage.cost = search.best_cost();
-        stage.status =
-            outcome.status == OptimiserOutcome::Status::converged ? "converged" : "max_evaluations";
+        using Status = OptimiserOutcome::Status;
+        stage.status = outcome.status == Status::converged         ? "converged"
+                       : outcome.status == Status::max_evaluations ? "max_evaluations"
+                                                                   : "ended early: " + outcome.detail;
         if (stuck.empty())
           found.start = end;
         else
@@ -91,7 +99,9 @@ VectorXd better_start(JointProblem& problem, StagesOutcome& found) {
   const ObjectiveEvaluation& after = problem.evaluate(found.start);
   if (problem.was_stopped() || before.failed || (!after.failed && after.cost <= before.cost))
     return found.start;
-  found.stages.back().status += "; the fit begins at the initial values, which cost less";
+  found.stages.back().status +=
+      after.failed ? "; the fit begins at the initial values, since its run there failed: " + after.failure
+                   : "; the fit begins at the initial values, which cost less";
   return initial;
 }
 

@@ -93,5 +93,27 @@ TEST(FurtherViews, PredictWhatASecondCameraBrings) {
   }
 }
 
+TEST(FurtherViews, FewPointsAndSettledSkinHaveOnlyTheRepeat) {
+  const auto only_repeat = [](FitClip clip) {
+    FitCase fit = test::three_parameters();
+    fit.rim_margin = 0;
+    JointProblem problem({clip}, fit);
+    const VectorXd t = problem.initial();
+    ASSERT_FALSE(problem.evaluate(t).failed);
+    const std::vector<FurtherView> views = further_views(problem, t, *problem.linearised(t));
+    ASSERT_EQ(views.size(), 1u);
+    for (const double ratio : views[0].ratios) EXPECT_NEAR(ratio, std::sqrt(0.5), 1e-9);
+  };
+  FitClip settled = make_clip({test::make_camera()});
+  settled.scene = test::drag_scene(
+      kFrames, {R"(/skin/pre_stretch={"stretch": 1.05, "across": 1.02, "direction": [1, 0, 0]})"});
+  only_repeat(settled);
+  // Two tracks, wherever they are on the skin.
+  FitClip two = make_clip({test::make_camera()});
+  const std::size_t middle = two.tracks.tracks.size() / 2;
+  two.tracks.tracks = {two.tracks.tracks[middle], two.tracks.tracks[middle + 3]};
+  only_repeat(two);
+}
+
 }  // namespace
 }  // namespace rhytid::fitting

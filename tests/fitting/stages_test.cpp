@@ -107,7 +107,11 @@ TEST(Stages, AreResumedToTheSameBits) {
   observer.run = [&](const FitProgress&) { ++runs; };
   observer.should_stop = [&] { return runs >= 3; };
   EXPECT_TRUE(run_fit(input, observer).stopped);
-  const FitResult resumed = run_fit(input);
+  FitObserver counting;
+  int replayed = 0;
+  counting.run = [&](const FitProgress& run) { replayed += run.replayed ? 1 : 0; };
+  const FitResult resumed = run_fit(input, counting);
+  EXPECT_GE(replayed, 3) << "what was there was not run again";
   fs::remove_all(input.evaluations);
   const FitResult whole = run_fit(input);
   ASSERT_TRUE(resumed.converged && whole.converged);

@@ -65,9 +65,10 @@ void add_discretisation(HtmlPage& page, const ReportData& data) {
   for (const SystematicShift& d : fit.systematic) {
     if (d.failure.empty()) run.push_back(&d);
     list.push_back(d.name + ": " + d.change +
-                   (d.failure.empty()
+                   (!d.failure.empty() ? ". Could not be run: " + d.failure
+                    : d.rms_px > 0
                         ? ", which moves the predicted points by " + short_text(d.rms_px, 2) + " px (rms)"
-                        : ". Could not be run: " + d.failure));
+                        : ""));
   }
   page.paragraph(
       "At the answer the tracks were predicted again with each kind of step of the discretisation finer, and "
