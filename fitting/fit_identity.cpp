@@ -36,6 +36,18 @@ std::string tracks_digest(const TrackSet& tracks) {
   return d.hex();
 }
 
+/// Poses of a head that moves come from a surface that the scene crops: its files may change beside the patch.
+std::string head_digest(const FitProblem& problem) {
+  if (problem.head_motion().empty()) return {};
+  Digest d;
+  for (const HeadMotion& motion : problem.head_motion())
+    for (const Camera& camera : motion.cameras) {
+      d.matrix(camera.rotation);
+      d.matrix(camera.translation);
+    }
+  return d.hex();
+}
+
 std::string measured_digest(const std::vector<Measurement>& measured) {
   if (measured.empty()) return {};
   Digest d;
@@ -85,7 +97,7 @@ FitIdentity fit_identity(const FitClip& clip, const FitCase& options, const FitP
   return {{"program", program_digest()},
           {"scene", scene_digest(clip.scene, problem)},
           {"camera", cameras},
-          {"tracks", tracks_digest(clip.tracks) + measured_digest(clip.measured)},
+          {"tracks", tracks_digest(clip.tracks) + measured_digest(clip.measured) + head_digest(problem)},
           {"parameters", parameters_digest(options, problem.parametrisation())}};
 }
 
