@@ -297,6 +297,16 @@ void read_parameters(const LocatedJson& located, const std::vector<Scene>& scene
   }
 }
 
+void read_profiles(const LocatedJson& located, const std::vector<Scene>& scenes, Case& c) {
+  const json& list = located.json["fit"]["profiles"];
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string pointer = "/fit/profiles/" + std::to_string(i);
+    for (std::string& address :
+         fitted_named(c, scenes, c.fit.parameters, list[i], located.where(pointer) + ": " + pointer))
+      c.fit.profiles.push_back(std::move(address));
+  }
+}
+
 }  // namespace
 
 Case load_case(const std::string& path, const std::vector<std::string>& settings) {
@@ -359,6 +369,7 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
     }
   }
   read_considered(located, scenes, c);
+  read_profiles(located, scenes, c);
   for (const Scene& scene : scenes) check_gauge_layer(located, scene, c.fit.gauge_layer);
   return c;
 }

@@ -89,6 +89,8 @@ struct FitCase {
   double start_spread = 1;  ///< half width of the box that they are in, transformed; 1 = a quarter of a range
   int screen_frames = 0;    ///< they are compared on, 0 = half of those compared
   unsigned seed = 1;        ///< of the starts
+  /// Addresses (joint_address) of fitted parameters whose profile likelihood is wanted, or "all".
+  std::vector<std::string> profiles;
   /// Whether what the discretisation does to the answer is estimated, and enters the intervals.
   bool discretisation_check = true;
   /// Held parameters whose error enters the intervals (consider.h), σ_h in prior_sigma. Nothing given: the friction
@@ -146,6 +148,12 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
 /// without clips. Throws InputError beginning with `where`.
 std::vector<FitParameter> parameters_named(const Case& c, const std::vector<Scene>& scenes,
                                            const std::string& address, const std::string& where);
+
+/// Addresses as the fit knows them (joint_address) of those of `fitted` that an address names; "all" stays.
+/// Throws InputError beginning with `where` when none is fitted.
+std::vector<std::string> fitted_named(const Case& c, const std::vector<Scene>& scenes,
+                                      const std::vector<FitParameter>& fitted, const std::string& address,
+                                      const std::string& where);
 
 /// The scenes that a fit of the case runs: one, or one per clip. Throws InputError.
 std::vector<Scene> scenes_of(const Case& c);

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "fitting/case.h"
+#include "fitting/joint_problem.h"
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
 #include "sim/scene/nearest.h"
@@ -86,6 +87,20 @@ std::vector<FitParameter> parameters_named(const Case& c, const std::vector<Scen
   if (name == "*") described(scenes[0], rest);  // throws
   throw InputError(where, shown_json(address),
                    "a clip of the case, nearest is \"" + nearest_word(name, names) + "\"");
+}
+
+std::vector<std::string> fitted_named(const Case& c, const std::vector<Scene>& scenes,
+                                      const std::vector<FitParameter>& fitted, const std::string& address,
+                                      const std::string& where) {
+  if (address == "all") return {address};
+  std::vector<std::string> found;
+  std::string known;
+  for (const FitParameter& p : fitted) known += ", " + joint_address(p);
+  for (const FitParameter& named : parameters_named(c, scenes, address, where))
+    for (const FitParameter& p : fitted)
+      if (joint_address(p) == joint_address(named)) found.push_back(joint_address(p));
+  if (found.empty()) throw InputError(where, shown_json(address), "all, or what is fitted" + known);
+  return found;
 }
 
 Case case_of_view(const Case& c, int clip, int view) {

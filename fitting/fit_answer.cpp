@@ -194,6 +194,27 @@ std::string start_table(const FitResult& result) {
   return num_optima == 0 ? text : text + layout(rows);
 }
 
+/// Intervals by profile beside those of the linearised model.
+std::string profile_table(const FitResult& result) {
+  std::vector<Row> rows = {{"parameter", "unit", "fitted", "95 % by profile", "linearised", "runs"}};
+  std::string warnings;
+  for (const ParameterProfile& profile : result.profiles) {
+    const auto p = std::find_if(result.parameters.begin(), result.parameters.end(),
+                                [&](const FittedParameter& x) { return x.address == profile.address; });
+    if (p == result.parameters.end()) continue;
+    std::string open = profile.bounded_below ? "" : "below";
+    if (!profile.bounded_above) open += open.empty() ? "above" : " and above";
+    rows.push_back({p->name, p->unit, number(p->value),
+                    number(profile.low95) + " .. " + number(profile.high95) +
+                        (open.empty() ? "" : " (open " + open + ")"),
+                    number(profile.linear_low95) + " .. " + number(profile.linear_high95),
+                    std::to_string(profile.forward_runs)});
+    if (!profile.warning.empty()) warnings += "Warning: " + profile.warning + ".\n";
+  }
+  return layout(rows) + "Both without what elements, steps and held parameters add to the interval above.\n" +
+         warnings;
+}
+
 }  // namespace
 
 std::string answer_text(const FitResult& result) {
@@ -221,6 +242,7 @@ std::string answer_text(const FitResult& result) {
   if (!result.clips.empty()) text += "\n" + clip_table(result) + "\n";
   text += result.gauge + "\n";
   if (!result.starts.empty()) text += "\n" + start_table(result) + "\n";
+  if (!result.profiles.empty()) text += "\n" + profile_table(result) + "\n";
   if (!result.systematic.empty()) text += "\n" + shift_table(result);
   text += further_view_line(result);
   for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";

@@ -20,9 +20,13 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* format_name = "rhytid fit 1";
 
+/// A record that is read, or the same as it is written.
+template <class Record, class T>
+concept Writable = std::is_same_v<std::remove_const_t<Record>, T>;
+
 // Each record lists its fields once; the same list writes and reads.
-template <class Archive, class Record>
-void parameter_fields(Archive& field, Record& p) {
+template <class Archive, Writable<FittedParameter> Record>
+void fields(Archive& field, Record& p) {
   field("address", p.address);
   field("name", p.name);
   field("unit", p.unit);
@@ -39,8 +43,8 @@ void parameter_fields(Archive& field, Record& p) {
   field("truth", p.truth);
 }
 
-template <class Archive, class Record>
-void derived_fields(Archive& field, Record& d) {
+template <class Archive, Writable<DerivedQuantity> Record>
+void fields(Archive& field, Record& d) {
   field("name", d.name);
   field("unit", d.unit);
   field("value", d.value);
@@ -49,8 +53,8 @@ void derived_fields(Archive& field, Record& d) {
   field("truth", d.truth);
 }
 
-template <class Archive, class Record>
-void iteration_fields(Archive& field, Record& i) {
+template <class Archive, Writable<FitIteration> Record>
+void fields(Archive& field, Record& i) {
   field("iteration", i.iteration);
   field("evaluations", i.evaluations);
   field("cost", i.cost);
@@ -60,8 +64,8 @@ void iteration_fields(Archive& field, Record& i) {
   field("values", i.values);
 }
 
-template <class Archive, class Record>
-void shift_fields(Archive& field, Record& d) {
+template <class Archive, Writable<SystematicShift> Record>
+void fields(Archive& field, Record& d) {
   field("name", d.name);
   field("change", d.change);
   field("failure", d.failure);
@@ -70,8 +74,8 @@ void shift_fields(Archive& field, Record& d) {
   field("shift", d.shift);
 }
 
-template <class Archive, class Record>
-void stage_fields(Archive& field, Record& s) {
+template <class Archive, Writable<FittedStage> Record>
+void fields(Archive& field, Record& s) {
   field("change", s.change);
   field("status", s.status);
   field("forward_runs", s.forward_runs);
@@ -80,14 +84,14 @@ void stage_fields(Archive& field, Record& s) {
   field("values", s.values);
 }
 
-template <class Archive, class Record>
-void further_fields(Archive& field, Record& v) {
+template <class Archive, Writable<FurtherView> Record>
+void fields(Archive& field, Record& v) {
   field("name", v.name);
   field("ratios", v.ratios);
 }
 
-template <class Archive, class Record>
-void measurement_fields(Archive& field, Record& m) {
+template <class Archive, Writable<FittedMeasurement> Record>
+void fields(Archive& field, Record& m) {
   field("clip", m.clip);
   field("frame", m.frame);
   field("quantity", m.quantity);
@@ -96,8 +100,8 @@ void measurement_fields(Archive& field, Record& m) {
   field("predicted", m.predicted);
 }
 
-template <class Archive, class Record>
-void start_fields(Archive& field, Record& s) {
+template <class Archive, Writable<FittedStart> Record>
+void fields(Archive& field, Record& s) {
   field("initial", s.initial);
   field("screened_cost", s.screened_cost);
   field("failure", s.failure);
@@ -110,8 +114,35 @@ void start_fields(Archive& field, Record& s) {
   field("costs", s.costs);
 }
 
-template <class Archive, class Record>
-void view_fields(Archive& field, Record& v) {
+template <class Archive, Writable<ProfilePoint> Record>
+void fields(Archive& field, Record& p) {
+  field("value", p.value);
+  field("cost", p.cost);
+  field("deviance", p.deviance);
+  field("status", p.status);
+  field("forward_runs", p.forward_runs);
+  field("values", p.values);
+}
+
+template <class Archive, Writable<ParameterProfile> Record>
+void fields(Archive& field, Record& p) {
+  field("address", p.address);
+  field("low95", p.low95);
+  field("high95", p.high95);
+  field("bounded_below", p.bounded_below);
+  field("bounded_above", p.bounded_above);
+  field("linear_low95", p.linear_low95);
+  field("linear_high95", p.linear_high95);
+  field("sigma", p.sigma);
+  field("widening", p.widening);
+  field("quantile", p.quantile);
+  field("forward_runs", p.forward_runs);
+  field("warning", p.warning);
+  field("points", p.points);
+}
+
+template <class Archive, Writable<FittedView> Record>
+void fields(Archive& field, Record& v) {
   field("camera", v.camera);
   field("num_tracks", v.num_tracks);
   field("num_observations", v.num_observations);
@@ -121,8 +152,8 @@ void view_fields(Archive& field, Record& v) {
   field("camera_file", v.camera_file);
 }
 
-template <class Archive, class Record>
-void clip_fields(Archive& field, Record& c) {
+template <class Archive, Writable<FittedClip> Record>
+void fields(Archive& field, Record& c) {
   field("name", c.name);
   field("num_tracks", c.num_tracks);
   field("tracks_left_out", c.tracks_left_out);
@@ -137,8 +168,8 @@ void clip_fields(Archive& field, Record& c) {
   field("fitted_scene_file", c.fitted_scene_file);
 }
 
-template <class Archive, class Record>
-void result_fields(Archive& field, Record& r) {
+template <class Archive, Writable<FitResult> Record>
+void fields(Archive& field, Record& r) {
   field("case_name", r.case_name);
   field("case_file", r.case_file);
   field("optimiser", r.optimiser);
@@ -165,6 +196,7 @@ void result_fields(Archive& field, Record& r) {
   field.optional("stages", r.stages);
   field.optional("further_views", r.further_views);
   field.optional("measured", r.measured);
+  field.optional("profiles", r.profiles);
   field.optional("starts", r.starts);
   field("singular_values", r.singular_values);
   field("right_vectors", r.right_vectors);
@@ -213,54 +245,10 @@ class Writer {
     for (Eigen::Index i = 0; i < m.rows(); ++i) rows.push_back(json(VectorXd(m.row(i).transpose())));
     return rows;
   }
-  static Json json(const FittedParameter& v) {
+  template <class Record>
+  static Json json(const Record& v) {
     Writer w;
-    parameter_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const DerivedQuantity& v) {
-    Writer w;
-    derived_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const FitIteration& v) {
-    Writer w;
-    iteration_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const SystematicShift& v) {
-    Writer w;
-    shift_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const FittedStage& v) {
-    Writer w;
-    stage_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const FurtherView& v) {
-    Writer w;
-    further_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const FittedMeasurement& v) {
-    Writer w;
-    measurement_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const FittedStart& v) {
-    Writer w;
-    start_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const FittedView& v) {
-    Writer w;
-    view_fields(w, v);
-    return std::move(w.out);
-  }
-  static Json json(const FittedClip& v) {
-    Writer w;
-    clip_fields(w, v);
+    fields(w, v);
     return std::move(w.out);
   }
   template <class T>
@@ -340,45 +328,10 @@ class Reader {
       m.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
     }
   }
-  static void read(const Json& j, FittedParameter& v, const std::string& where) {
+  template <class Record>
+  static void read(const Json& j, Record& v, const std::string& where) {
     Reader r(j, where);
-    parameter_fields(r, v);
-  }
-  static void read(const Json& j, DerivedQuantity& v, const std::string& where) {
-    Reader r(j, where);
-    derived_fields(r, v);
-  }
-  static void read(const Json& j, FitIteration& v, const std::string& where) {
-    Reader r(j, where);
-    iteration_fields(r, v);
-  }
-  static void read(const Json& j, SystematicShift& v, const std::string& where) {
-    Reader r(j, where);
-    shift_fields(r, v);
-  }
-  static void read(const Json& j, FittedStage& v, const std::string& where) {
-    Reader r(j, where);
-    stage_fields(r, v);
-  }
-  static void read(const Json& j, FurtherView& v, const std::string& where) {
-    Reader r(j, where);
-    further_fields(r, v);
-  }
-  static void read(const Json& j, FittedMeasurement& v, const std::string& where) {
-    Reader r(j, where);
-    measurement_fields(r, v);
-  }
-  static void read(const Json& j, FittedStart& v, const std::string& where) {
-    Reader r(j, where);
-    start_fields(r, v);
-  }
-  static void read(const Json& j, FittedView& v, const std::string& where) {
-    Reader r(j, where);
-    view_fields(r, v);
-  }
-  static void read(const Json& j, FittedClip& v, const std::string& where) {
-    Reader r(j, where);
-    clip_fields(r, v);
+    fields(r, v);
   }
   template <class T>
   static void read(const Json& j, std::vector<T>& v, const std::string& where) {
@@ -417,6 +370,10 @@ void check_sizes(const FitResult& result, const std::string& where) {
     if (start.evaluations.size() != start.costs.size())
       throw InputError(where + "/" + at, "other numbers of evaluations and costs", "one cost for each");
   }
+  for (size_t i = 0; i < result.profiles.size(); ++i)
+    for (const ProfilePoint& point : result.profiles[i].points)
+      check(("profiles/" + std::to_string(i) + "/points").c_str(),
+            static_cast<Eigen::Index>(point.values.size()), 1, 1);
   for (size_t i = 0; i < result.history.size(); ++i) {
     const auto size = static_cast<Eigen::Index>(result.history[i].values.size());
     if (size > 0) check(("history/" + std::to_string(i) + "/values").c_str(), size, 1, 1);
@@ -438,7 +395,7 @@ std::string FitResult::address_in_clip(const FittedParameter& parameter, int cli
 void write_fit_result(const FitResult& result, const std::string& folder) {
   Writer writer;
   writer("format", std::string(format_name));
-  result_fields(writer, result);
+  fields(writer, result);
   writer("num_residuals", static_cast<int>(result.residuals.size()));
   // fit.json comes last: where it is, the others are complete.
   if (result.fitted_scene)
@@ -472,7 +429,7 @@ FitResult read_fit_result(const std::string& folder) {
   std::string format;
   reader("format", format);
   if (format != format_name) throw InputError(path + ":/format", format, format_name);
-  result_fields(reader, result);
+  fields(reader, result);
   check_sizes(result, path + ":");
   const std::string csv = folder + "/residuals.csv";
   result.residuals = parse_residuals(read_file(csv), csv, result);

@@ -80,6 +80,31 @@ struct FittedStart {
   std::vector<double> costs;     ///< there
 };
 
+/// One value of a profile (profile.h), the others fitted again.
+struct ProfilePoint {
+  double value = 0;  ///< of the parameter, internal units
+  double cost = 0;
+  double deviance = 0;         ///< 2 (cost − cost of the answer)/w²
+  std::string status;          ///< converged | max_evaluations; `optimum`: the answer itself
+  int forward_runs = 0;        ///< that it took
+  std::vector<double> values;  ///< of all parameters
+};
+
+/// Profile likelihood of one parameter; numbers in internal units.
+struct ParameterProfile {
+  std::string address;
+  /// 95 % interval of the profile; the bound where that side is not bounded by the data.
+  double low95 = 0, high95 = 0;
+  bool bounded_below = true, bounded_above = true;
+  /// Of the linearised model with the same noise, without the systematic shifts that the reported interval has.
+  double linear_low95 = 0, linear_high95 = 0;
+  double sigma = 0;                   ///< its standard deviation, transformed; NaN = undetermined
+  double widening = 1, quantile = 0;  ///< w and q: the interval is where the deviance is below q²
+  int forward_runs = 0;
+  std::string warning;               ///< that a lower cost than the answer's was found; empty when not
+  std::vector<ProfilePoint> points;  ///< by value
+};
+
 /// One observation against the fitted prediction.
 struct FitResidual {
   int frame = 0, track = 0;
@@ -130,6 +155,7 @@ struct FitResult {
   double seconds = 0, forward_seconds = 0;  ///< whole fit; median forward run
   std::vector<FitIteration> history;
   std::vector<SystematicShift> systematic;  ///< finer steps, then held parameters
+  std::vector<ParameterProfile> profiles;   ///< of the parameters that were asked for
   std::vector<FittedStart> starts;          ///< empty when there was one
   VectorXd singular_values;              ///< of the whitened Jacobian by transformed parameters, descending
   MatrixXd right_vectors;                ///< [parameters][parameters] columns belong to singular_values

@@ -60,6 +60,12 @@ class Fit : public Verb {
                    "so many starts, that of the case and seeded ones about it: all are compared by a run on "
                    "the early frames, the fit goes on from the best few (/fit/local_fits)")
         ->check(CLI::Range(1, 100000));
+    app.add_option(
+           "--profile", profiles_,
+           "find the intervals of these fitted parameters (all: of all) also by holding each at values "
+           "about its best one and fitting the others again")
+        ->delimiter(',')
+        ->allow_extra_args(false);
     app.add_flag("--anew", anew_, "compute everything again, whatever an earlier start of this fit left");
   }
 
@@ -118,9 +124,22 @@ class Fit : public Verb {
     if (!optimiser_.empty()) options.optimiser = optimiser_;
     if (max_evaluations_ > 0) options.max_evaluations = max_evaluations_;
     if (starts_ > 0) options.starts = starts_;
-    if (addresses_.empty()) return options;
-    options.parameters.clear();
+    if (addresses_.empty() && profiles_.empty()) return options;
     const std::vector<Scene> scenes = fitting::scenes_of(c);
+    if (!addresses_.empty()) choose_parameters(c, scenes, options);
+    if (profiles_.empty()) return options;
+    options.profiles.clear();
+    for (const std::string& given : profiles_)
+      for (const std::string& address :
+           fitting::fitted_named(c, scenes, options.parameters, given, "--profile"))
+        options.profiles.push_back(address);
+    return options;
+  }
+
+  /// Those of --parameters, and of the profiles that the case asks for those that are left.
+  void choose_parameters(const fitting::Case& c, const std::vector<Scene>& scenes,
+                         fitting::FitCase& options) const {
+    options.parameters.clear();
     for (const std::string& given : addresses_)
       for (const fitting::FitParameter& named : fitting::parameters_named(c, scenes, given, "--parameters")) {
         const auto known = std::find_if(c.fit.parameters.begin(), c.fit.parameters.end(),
@@ -129,10 +148,16 @@ class Fit : public Verb {
                                         });
         options.parameters.push_back(known == c.fit.parameters.end() ? named : *known);
       }
-    return options;
+    std::erase_if(options.profiles, [&](const std::string& address) {
+      return address != "all" && std::none_of(options.parameters.begin(), options.parameters.end(),
+                                              [&](const fitting::FitParameter& p) {
+                                                return fitting::joint_address(p) == address;
+                                              });
+    });
   }
 
   static int most_runs(const fitting::FitCase& options) {
+    if (!options.profiles.empty()) return 0;  // not known
     if (options.starts == 1) return options.max_evaluations;
     return options.starts + std::min(options.starts, options.local_fits) * options.max_evaluations;
   }
@@ -162,7 +187,7 @@ class Fit : public Verb {
   }
 
   std::string optimiser_;
-  std::vector<std::string> addresses_;
+  std::vector<std::string> addresses_, profiles_;
   int max_evaluations_ = 0, starts_ = 0;
   bool anew_ = false;
 };

@@ -56,6 +56,11 @@ FitResult example() {
   r.starts.resize(2);
   r.starts[0] = {{1, 2}, 1. / 3, "", "converged", 0.1, {1.5, 2.5}, 7, 1, {1, 3}, {9, 0.1 + 0.2}};
   r.starts[1].failure = "a run that failed";
+  r.profiles.resize(2);
+  r.profiles[0] = {"/a/b", 0.1, 1. / 3, true, false, 0.2, 0.3, 1e-17, 1.25, 1.96, 9, "lower", {}};
+  r.profiles[0].points = {{0.1, 12, 4.5, "converged", 3, {0.1, nan_value}},
+                          {0.2, 10, 0, "optimum", 0, {0.2, 1}}};
+  r.profiles[1].sigma = nan_value;
   r.tracks_file = "tracks.csv";
   return r;
 }
@@ -104,6 +109,11 @@ TEST(FitResult, ReadsBackBitForBit) {
   EXPECT_EQ(s.singular_values, r.singular_values);
   EXPECT_EQ(s.right_vectors, r.right_vectors);
   EXPECT_EQ(s.cannot_tell, r.cannot_tell);
+  ASSERT_EQ(s.profiles.size(), 2u);
+  EXPECT_EQ(s.profiles[0].high95, 1. / 3);
+  EXPECT_FALSE(s.profiles[0].bounded_above);
+  EXPECT_EQ(s.profiles[0].points[1].status, "optimum");
+  EXPECT_TRUE(std::isnan(s.profiles[0].points[0].values[1]) && std::isnan(s.profiles[1].sigma));
   ASSERT_EQ(s.starts.size(), 2u);
   EXPECT_EQ(s.starts[0].values, r.starts[0].values);
   EXPECT_EQ(s.starts[0].costs, r.starts[0].costs);

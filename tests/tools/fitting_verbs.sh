@@ -59,6 +59,9 @@ expect 2 1 '^rhytid: error: a/tracks.csv: got no file, and no footage a/footage.
   fit case.json -o a
 expect 2 1 '^rhytid: error: --parameters: .*/ligaments/sources/c/strength' \
   fit case.json -o a --parameters /ligaments/sources/c/strength
+expect 2 1 '^rhytid: error: --profile: got "/ligaments/stiffness", expected all, or what is fitted, /colliders' \
+  fit case.json -o a --profile /ligaments/stiffness
+expect 2 1 '/fit/profiles/0: got "/nothing", expected' fit case.json -o a --set '/fit/profiles=["/nothing"]'
 expect 2 1 '^rhytid: error: --starts' fit case.json -o a --starts 0
 expect 2 1 '/fit/starts: got 0, expected' fit case.json -o a --set /fit/starts=0
 expect 2 1 '^rhytid: error: track: got neither a case nor --video, expected one of the two' track

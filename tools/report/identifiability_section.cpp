@@ -13,6 +13,8 @@ namespace {
 
 using fitting::FitResult;
 using fitting::FittedParameter;
+using fitting::ParameterProfile;
+using fitting::ProfilePoint;
 
 void add_singular_values(HtmlPage& page, const FitResult& fit) {
   // Bars need a base, and 1 is the natural one (a direction known to one standard deviation), but values
@@ -178,6 +180,99 @@ void add_further_views(HtmlPage& page, const FitResult& fit) {
   page.table(table);
 }
 
+double transformed(const FittedParameter& p, double value) {
+  if (p.transform == "log") return std::log(value);
+  if (p.transform == "logit") return std::log((value - p.lower) / (p.upper - value));
+  return value;
+}
+
+double from_transformed(const FittedParameter& p, double t) {
+  if (p.transform == "log") return std::exp(t);
+  if (p.transform == "logit") return p.lower + (p.upper - p.lower) / (1 + std::exp(-t));
+  return t;
+}
+
+/// Rise of the cost over the value, the parabola of the linearised model beside it.
+LinePlot profile_plot(const FittedParameter& p, const ParameterProfile& profile) {
+  const double level = profile.quantile * profile.quantile;
+  LinePlot plot;
+  plot.width = 360;
+  plot.height = 250;
+  const ReadableUnit unit = readable_unit(p.value, p.unit);
+  plot.x.label = p.name + (unit.unit.empty() ? "" : " [" + unit.unit + "]");
+  plot.y.label = "2ΔF/w²";
+  plot.y.minimum = std::min(
+      0.0,
+      1.1 * std::min_element(profile.points.begin(), profile.points.end(), [](const auto& a, const auto& b) {
+              return a.deviance < b.deviance;
+            })->deviance);
+  plot.y.maximum = 2.5 * level;
+  PlotSeries found, parabola;
+  found.label = "profile";
+  found.style = PlotStyle::line_and_points;
+  for (const ProfilePoint& point : profile.points) {
+    found.x.push_back(point.value / unit.scale);
+    found.y.push_back(point.deviance);
+  }
+  plot.series.push_back(found);
+  if (std::isfinite(profile.sigma)) {
+    parabola.label = "linearised";
+    parabola.dashed = true;
+    const double reach = std::sqrt(*plot.y.maximum), centre = transformed(p, p.value);
+    for (int i = -40; i <= 40; ++i) {
+      const double root = reach * i / 40;
+      const double value = from_transformed(p, centre + root * profile.sigma);
+      if (!(value >= profile.points.front().value && value <= profile.points.back().value)) continue;
+      parabola.x.push_back(value / unit.scale);
+      parabola.y.push_back(root * root);
+    }
+    plot.series.push_back(parabola);
+  }
+  plot.rules.push_back({false, level, "95 %"});
+  if (p.truth && std::isfinite(*p.truth)) plot.rules.push_back({true, *p.truth / unit.scale, "truth"});
+  return plot;
+}
+
+void add_profiles(HtmlPage& page, const FitResult& fit) {
+  if (fit.profiles.empty()) return;
+  page.heading("Profiles");
+  int runs = 0;
+  for (const ParameterProfile& profile : fit.profiles) runs += profile.forward_runs;
+  page.paragraph(
+      "Each parameter was held at values about its best one and all others were fitted again (" +
+      counted(runs, "forward run") +
+      "). Where the curve leaves the dashed parabola, the interval of the linearised model is only "
+      "approximate; where it stays below the 95 % level up to a bound, the footage does not bound the "
+      "parameter on that side. The cost is counted per widening² of the noise, as in the intervals. What "
+      "elements, steps and held parameters add to the reported intervals is in neither curve.");
+  HtmlTable table;
+  table.caption = "95 % intervals by profile and of the linearised model, both from the footage alone.";
+  table.header = {"parameter", "by profile", "linearised", "forward runs"};
+  page.begin_row();
+  for (const ParameterProfile& profile : fit.profiles) {
+    const auto p = std::find_if(fit.parameters.begin(), fit.parameters.end(),
+                                [&](const FittedParameter& x) { return x.address == profile.address; });
+    if (p == fit.parameters.end() || profile.points.empty()) continue;
+    const ReadableUnit unit = readable_unit(p->value, p->unit);
+    const int digits = digits_for(p->value, profile.low95, profile.high95);
+    const auto text = [&](double low, double high) {
+      return unit.number(low, digits) + " to " + unit.text(high, digits);
+    };
+    std::string open;
+    if (!profile.bounded_below) open = ", open below";
+    if (!profile.bounded_above) open += open.empty() ? ", open above" : " and above";
+    const std::string interval = text(profile.low95, profile.high95) + open;
+    page.svg_figure(svg(profile_plot(*p, profile)), "Profile of " + p->name + ": " + interval + ".",
+                    p->name + ": " + interval + ".");
+    table.rows.push_back({p->name, interval, text(profile.linear_low95, profile.linear_high95),
+                          std::to_string(profile.forward_runs)});
+  }
+  page.end_row();
+  page.table(table);
+  for (const ParameterProfile& profile : fit.profiles)
+    if (!profile.warning.empty()) page.badge(Verdict::doubtful, "Warning: " + profile.warning);
+}
+
 }  // namespace
 
 void add_identifiability(HtmlPage& page, const ReportData& data) {
@@ -193,6 +288,7 @@ void add_identifiability(HtmlPage& page, const ReportData& data) {
   page.end_row();
   if (fit.correlation.rows() > 1) page.paragraph(strongest_pair(fit));
   if (fit.right_vectors.size() > 0 && fit.parameters.size() > 1) add_weakest(page, fit);
+  add_profiles(page, fit);
   add_further_views(page, fit);
 }
 

@@ -126,6 +126,35 @@ TEST(Report, SeveralStartsAreAFanAndATable) {
                           HasSubstr("start 0 (of the case)"), HasSubstr("345.25"), Not(HasSubstr("nan"))));
 }
 
+TEST(Report, ProfilesHaveAPlotEach) {
+  const std::string folder = folder_for("profiles");
+  fitting::FitResult fit = test::write_synthetic_fit(folder, 1);
+  const size_t plots = count(without_pictures(read_file(report(folder, false).path)), "<svg");
+  for (const size_t k : {0u, 1u}) {
+    const fitting::FittedParameter& p = fit.parameters[k];
+    fitting::ParameterProfile& profile = fit.profiles.emplace_back();
+    profile.address = p.address;
+    profile.low95 = p.low95, profile.high95 = k == 0 ? p.high95 : p.upper;
+    profile.linear_low95 = p.low95, profile.linear_high95 = p.high95;
+    profile.bounded_above = k == 0;
+    profile.sigma = p.sigma;
+    profile.quantile = 1.96;
+    profile.forward_runs = 17;
+    for (int i = -3; i <= 3; ++i) {
+      const double rise = i > 0 && k == 1 ? 0.1 * i : i * i;
+      profile.points.push_back({p.value * std::exp(i * p.sigma), 210 + 0.5 * rise, rise, "converged", 2, {}});
+      for (const auto& other : fit.parameters) profile.points.back().values.push_back(other.value);
+    }
+  }
+  fit.profiles[1].warning = "the answer is not the optimum";
+  fitting::write_fit_result(fit, folder);
+  const std::string html = without_pictures(read_file(report(folder, false).path));
+  EXPECT_EQ(test::html_complaint(html), "");
+  EXPECT_EQ(count(html, "<svg"), plots + 2);
+  EXPECT_THAT(html, AllOf(HasSubstr("34 forward runs"), HasSubstr("open above"), HasSubstr("linearised"),
+                          HasSubstr("Warning: the answer is not the optimum"), Not(HasSubstr("nan"))));
+}
+
 TEST(Report, IsTheSameTwice) {
   const std::string folder = folder_for("twice");
   test::write_synthetic_fit(folder, 1);
