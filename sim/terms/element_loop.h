@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstring>
+#include <utility>
 
 #include "sim/core/parallel.h"
 #include "sim/terms/term.h"
@@ -78,14 +79,20 @@ void for_elements(const Term& term, const StepInfo& step, const TermStepData& da
   for (std::size_t gi = 0; gi < term.groups().size(); ++gi) for_elements(term, gi, step, data, visit);
 }
 
-/// A nodal vector per element of a group, [num_elements][n][width], zero at first.
+/// A nodal vector per element of a group, [num_elements][n][width], zero at first. Their memory is kept by the thread for
+/// the next ones: fresh pages cost as much as the elements.
 class ElementVectors {
  public:
   ElementVectors(const TermGroup& group, int width)
       : group_(&group),
         width_(width),
         stride_(static_cast<std::size_t>(group.num_nodes) * width),
-        values_(stride_ * group.num_elements, 0.0) {}
+        values_(std::move(kept())) {
+    values_.assign(stride_ * group.num_elements, 0.0);
+  }
+  ~ElementVectors() { kept() = std::move(values_); }
+  ElementVectors(const ElementVectors&) = delete;
+  ElementVectors& operator=(const ElementVectors&) = delete;
   double* of(const TermElement& element) { return values_.data() + stride_ * element.index; }
   /// Adds all elements to a field [num_nodes][width], in element order.
   void add_to(double* field) const {
@@ -105,6 +112,10 @@ class ElementVectors {
       for (int k = 0; k < width_; ++k) to[k] += map(local[k]);
       local += width_;
     }
+  }
+  static std::vector<double>& kept() {
+    thread_local std::vector<double> values;
+    return values;
   }
   const TermGroup* group_;
   int width_;

@@ -16,22 +16,22 @@ inline namespace RHYTID_ISA {
 
 inline constexpr int kMaxRows = 3 * 200;  ///< nq·R at most, a multiple of 8
 
+/// Vectors of the tiles below; rows and nodes are padded to multiples of 8.
+inline constexpr int kSumTile = kLanes == 8 ? 1 : 2;
+
 /// natural[a][row] = Σ_i u[i][a] table[row][i]. Rows are written up to the next multiple of 8.
 template <int R>
 void gather(const ElementView& v, const double* u, double (*natural)[kMaxRows]) {
-  constexpr int tile = 2 * kLanes;
+  constexpr int tile = kSumTile * kLanes;
   const int rows = v.num_points * R;
   for (int k = 0; k < rows; k += tile) {
-    Lanes sum[3][2] = {};
+    Lanes sum[3][kSumTile] = {};
     for (int i = 0; i < v.num_nodes; ++i) {
       const double* t = v.rows_by_node + static_cast<std::size_t>(i) * v.padded_rows + k;
-      Lanes low, high;
-      std::memcpy(&low, t, sizeof low);
-      std::memcpy(&high, t + kLanes, sizeof high);
-      for (int a = 0; a < 3; ++a) {
-        sum[a][0] += u[3 * i + a] * low;
-        sum[a][1] += u[3 * i + a] * high;
-      }
+      Lanes table[kSumTile];
+      for (int s = 0; s < kSumTile; ++s) std::memcpy(&table[s], t + s * kLanes, sizeof(Lanes));
+      for (int a = 0; a < 3; ++a)
+        for (int s = 0; s < kSumTile; ++s) sum[a][s] += u[3 * i + a] * table[s];
     }
     for (int a = 0; a < 3; ++a) std::memcpy(natural[a] + k, sum[a], sizeof sum[a]);
   }
@@ -40,19 +40,16 @@ void gather(const ElementView& v, const double* u, double (*natural)[kMaxRows]) 
 /// f[i][a] += Σ_row natural[a][row] table[row][i].
 template <int R>
 void scatter(const ElementView& v, const double (*natural)[kMaxRows], double* f) {
-  constexpr int tile = 2 * kLanes;
+  constexpr int tile = kSumTile * kLanes;
   const int rows = v.num_points * R;
   for (int i = 0; i < v.num_nodes; i += tile) {
-    Lanes sum[3][2] = {};
+    Lanes sum[3][kSumTile] = {};
     for (int k = 0; k < rows; ++k) {
       const double* t = v.node_by_row + static_cast<std::size_t>(k) * v.padded_nodes + i;
-      Lanes low, high;
-      std::memcpy(&low, t, sizeof low);
-      std::memcpy(&high, t + kLanes, sizeof high);
-      for (int a = 0; a < 3; ++a) {
-        sum[a][0] += natural[a][k] * low;
-        sum[a][1] += natural[a][k] * high;
-      }
+      Lanes table[kSumTile];
+      for (int s = 0; s < kSumTile; ++s) std::memcpy(&table[s], t + s * kLanes, sizeof(Lanes));
+      for (int a = 0; a < 3; ++a)
+        for (int s = 0; s < kSumTile; ++s) sum[a][s] += natural[a][k] * table[s];
     }
     const int count = v.num_nodes - i < tile ? v.num_nodes - i : tile;
     for (int j = 0; j < count; ++j)

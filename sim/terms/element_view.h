@@ -17,20 +17,23 @@ inline constexpr int kMaxLinePoints = 6, kLineStride = 8;
 /// Where a prism's shape functions and points are products of plane and line, both factors by themselves: node
 /// (j, c) is j · line_nodes + c, point (t, z) is t · line_points + z.
 struct ProductView {
-  int plane_nodes = 0, padded_plane_nodes = 0;  ///< padded to a multiple of 4
+  int plane_nodes = 0, padded_plane_nodes = 0;  ///< padded to a multiple of 8
   int line_nodes = 0, line_points = 0;          ///< 0 points: no product
   const double* plane = nullptr;                ///< [t][∂/∂u, ∂/∂v, value][padded_plane_nodes]
   const double* line = nullptr;                 ///< [z][value, ∂/∂w][kLineStride]
+  const double* plane_by_node =
+      nullptr;                ///< `plane` the other way round: [node][∂/∂u, ∂/∂v, value by t], padded
+  int padded_plane_rows = 0;  ///< length of a row of it, a multiple of 8
 };
 
 /// Doubles that the sum of an element's Hessian needs (HessianBlocks, ProductHessian).
 inline std::size_t hessian_work_size(int padded_nodes, const ProductView& p) {
-  constexpr std::size_t pad = 8;
+  constexpr std::size_t pad = 16;
   const std::size_t n8 = static_cast<std::size_t>(padded_nodes), rows = kHessianRows;
   const std::size_t m = 3 * static_cast<std::size_t>(p.line_nodes),
                     np = static_cast<std::size_t>(p.plane_nodes), n = m * np;
   return std::max(6 * n8 * n8 + 7 * rows * n8,
-                  n * (n + pad) + rows * (n + 2 * pad) + m * rows * 3 * (m + pad));
+                  n * (n + pad) + rows * (n + 2 * pad) + m * rows * 3 * (m + pad) + pad);
 }
 
 /// Everything an element kernel reads, as plain pointers (null where a law has none).

@@ -16,7 +16,7 @@ ProductTables product_tables(const TriangleBasis& triangle, const LineBasis& lin
                              const PrismRule& rule) {
   ProductTables t;
   t.plane_nodes = triangle.num_nodes();
-  t.padded_plane_nodes = (t.plane_nodes + 3) / 4 * 4;
+  t.padded_plane_nodes = (t.plane_nodes + 7) / 8 * 8;
   t.line_nodes = line.num_nodes();
   t.line_points = rule.line_points;
   require(t.line_points <= kMaxLinePoints && t.line_nodes <= kLineStride, "prism_group: too many points");
@@ -29,6 +29,13 @@ ProductTables product_tables(const TriangleBasis& triangle, const LineBasis& lin
     double* const row = t.plane.data() + k * 3 * padded;
     triangle.evaluate(point.u, point.v, row + 2 * padded, row, row + padded);
   }
+  t.padded_plane_rows = (3 * static_cast<int>(plane_points) + 7) / 8 * 8;
+  const std::size_t rows = static_cast<std::size_t>(t.padded_plane_rows);
+  t.plane_by_node.resize(static_cast<std::size_t>(t.plane_nodes) * rows);
+  for (std::size_t j = 0; j < static_cast<std::size_t>(t.plane_nodes); ++j)
+    for (std::size_t r = 0; r < 3; ++r)
+      for (std::size_t k = 0; k < plane_points; ++k)
+        t.plane_by_node[j * rows + r * plane_points + k] = t.plane[(3 * k + r) * padded + j];
   for (int z = 0; z < t.line_points; ++z) {
     const double w = slab.w_begin + 0.5 * (slab.w_end - slab.w_begin) * (rule.points[z].w + 1);
     double* const row = t.line.data() + static_cast<std::size_t>(z) * 2 * kLineStride;

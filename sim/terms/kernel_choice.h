@@ -8,7 +8,10 @@
 
 namespace rhytid {
 
-/// Kernels of viscoelastic skin for "avx2" or "baseline"; null where this machine or build has none.
+/// Whether this machine and build have the kernels of "avx512", "avx2" or "baseline".
+bool has_instructions(std::string_view isa);
+
+/// Kernels of viscoelastic skin for one of them; null where this machine or build has none.
 const KernelTable* skin_kernels_of(std::string_view isa);
 
 }  // namespace rhytid

@@ -53,7 +53,7 @@ const KernelTable& pre_stretched_skin_kernels();
 const KernelTable& pre_stretched_elastic_skin_kernels();
 /// Prism kernels of the volumetric term alone.
 const KernelTable& volume_kernels();
-/// Name of the instruction set those use: "avx2" or "baseline".
+/// Name of the instruction set those use: "avx512", "avx2" or "baseline".
 const char* skin_kernel_isa();
 const KernelTable& ligament_kernels();
 const KernelTable& fung_ligament_kernels();

@@ -1,6 +1,6 @@
 // Which compiled kernels answer: the run-time choice of instruction set, and the surface laws.
 #include <cstdlib>
-#include <cstring>
+#include <string_view>
 
 #include "sim/terms/contact_law.h"
 #include "sim/terms/kernel_choice.h"
@@ -9,13 +9,9 @@
 
 namespace rhytid {
 
-#ifdef RHYTID_HAVE_AVX2
-#define RHYTID_TABLES(name) extern const KernelTable name##_table_baseline, name##_table_avx2;
-#define RHYTID_CHOSEN(name) use_avx2() ? name##_table_avx2 : name##_table_baseline
-#else
-#define RHYTID_TABLES(name) extern const KernelTable name##_table_baseline;
-#define RHYTID_CHOSEN(name) name##_table_baseline
-#endif
+// Tables are declared whether or not this build has them.
+#define RHYTID_TABLES(name) \
+  extern const KernelTable name##_table_baseline, name##_table_avx2, name##_table_avx512;
 RHYTID_TABLES(skin)
 RHYTID_TABLES(elastic)
 RHYTID_TABLES(volume)
@@ -24,50 +20,76 @@ RHYTID_TABLES(pre_stretched_elastic)
 
 namespace {
 
-bool has_avx2() {
-#ifdef RHYTID_HAVE_AVX2
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-  return false;
+enum class InstructionSet { baseline, avx2, avx512 };
+
+/// The one of that name if this build and the processor have it, else the portable one; the best for an empty name.
+InstructionSet available(std::string_view wish) {
+#ifdef RHYTID_HAVE_AVX512
+  if ((wish.empty() || wish == "avx512") && __builtin_cpu_supports("avx512f") &&
+      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+    return InstructionSet::avx512;
 #endif
+#ifdef RHYTID_HAVE_AVX2
+  if ((wish.empty() || wish == "avx2") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    return InstructionSet::avx2;
+#endif
+  (void)wish;
+  return InstructionSet::baseline;
 }
 
-/// AVX2 unless the processor lacks it or RHYTID_ISA=baseline asks for the portable kernels.
-bool use_avx2() {
-  static const bool yes = [] {
+/// The best, or what RHYTID_ISA asks for.
+InstructionSet chosen() {
+  static const InstructionSet set = [] {
     const char* wish = std::getenv("RHYTID_ISA");
-    if (wish && std::strcmp(wish, "baseline") == 0) return false;
-    return has_avx2();
+    const std::string_view name = wish ? wish : "";
+    const bool known = name == "baseline" || name == "avx2" || name == "avx512";
+    return available(known ? name : "");
   }();
-  return yes;
+  return set;
 }
+
+const char* name(InstructionSet set) {
+  return set == InstructionSet::avx512 ? "avx512" : set == InstructionSet::avx2 ? "avx2" : "baseline";
+}
+
+/// What the declarations of tables that this build lacks stand for is never asked for.
+#if defined(RHYTID_HAVE_AVX512)
+#define RHYTID_TABLE(name, set)                          \
+  ((set) == InstructionSet::avx512 ? name##_table_avx512 \
+   : (set) == InstructionSet::avx2 ? name##_table_avx2   \
+                                   : name##_table_baseline)
+#elif defined(RHYTID_HAVE_AVX2)
+#define RHYTID_TABLE(name, set) ((set) == InstructionSet::avx2 ? name##_table_avx2 : name##_table_baseline)
+#else
+#define RHYTID_TABLE(name, set) ((void)(set), name##_table_baseline)
+#endif
 
 }  // namespace
 
 const KernelTable& skin_kernels() {
-  return RHYTID_CHOSEN(skin);
+  return RHYTID_TABLE(skin, chosen());
 }
 const KernelTable& elastic_skin_kernels() {
-  return RHYTID_CHOSEN(elastic);
+  return RHYTID_TABLE(elastic, chosen());
 }
 const KernelTable& volume_kernels() {
-  return RHYTID_CHOSEN(volume);
+  return RHYTID_TABLE(volume, chosen());
 }
 const KernelTable& pre_stretched_skin_kernels() {
-  return RHYTID_CHOSEN(pre_stretched_skin);
+  return RHYTID_TABLE(pre_stretched_skin, chosen());
 }
 const KernelTable& pre_stretched_elastic_skin_kernels() {
-  return RHYTID_CHOSEN(pre_stretched_elastic);
+  return RHYTID_TABLE(pre_stretched_elastic, chosen());
 }
 const char* skin_kernel_isa() {
-  return use_avx2() ? "avx2" : "baseline";
+  return name(chosen());
 }
 const KernelTable* skin_kernels_of(std::string_view isa) {
-  if (isa == "baseline") return &skin_table_baseline;
-#ifdef RHYTID_HAVE_AVX2
-  if (isa == "avx2" && has_avx2()) return &skin_table_avx2;
-#endif
-  return nullptr;
+  const InstructionSet set = available(isa);
+  return isa == name(set) ? &RHYTID_TABLE(skin, set) : nullptr;
+}
+bool has_instructions(std::string_view isa) {
+  return isa == name(available(isa));
 }
 
 const KernelTable& ligament_kernels() {

@@ -69,6 +69,22 @@ struct PrismKinematics {
       }
   }
 
+  /// J times the first Piola stress F⁻ᵀ M of a Mandel stress M = C S: cof F · M.
+  template <class V>
+  static void piola_from_mandel(const V* h, const V (*m)[3], V* piola) {
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, c = (a + 2) % 3;
+      V cofactor[3];
+      for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        cofactor[i] =
+            deformation(h, b, j) * deformation(h, c, k) - deformation(h, b, k) * deformation(h, c, j);
+      }
+      for (int i = 0; i < 3; ++i)
+        piola[3 * a + i] = cofactor[0] * m[0][i] + cofactor[1] * m[1][i] + cofactor[2] * m[2][i];
+    }
+  }
+
   /// ∂Y_c/∂H_aI = F_ak δ_lI + F_al δ_kI for c = (k, l).
   static void strain_gradient(const double* h, double (*b)[9]) {
     for (int c = 0; c < 6; ++c) {

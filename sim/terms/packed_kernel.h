@@ -5,6 +5,7 @@
 // A law supplies     num_constants, constants(θ, dt, c)   numbers of the step that are not worth a lane's
 // time
 //                    response(e, prepared, θ, c, σ, tangent)   energy; σ and, unless null, ∂σ/∂e [6][6]
+//                    mandel(e, J − 1, prepared, θ, c, M)       energy; Mandel stress C S, with P = F⁻ᵀ M
 // Tests    tests/sim/terms/term_kernels_test.cpp, skin_response_test.cpp
 #pragma once
 
@@ -13,7 +14,7 @@
 #include <limits>
 
 #include "sim/math/jacobi.h"
-#include "sim/terms/element_sums.h"
+#include "sim/terms/packed_sums.h"
 #include "sim/terms/product_hessian.h"
 
 namespace rhytid {
@@ -25,36 +26,44 @@ struct PackedKernel {
   static_assert(ne == 6 && nz == 9, "prisms only");
   static constexpr int at_least_one(int n) { return n > 0 ? n : 1; }
 
-  /// Points q … q + kLanes − 1 of an element; past its end the last point is repeated with weight 0.
-  struct Pack {
-    Lanes h[nz], y[ne], jacobian[9] = {}, weight = {};
-    Lanes prepared[at_least_one(np)] = {}, theta[nt] = {}, constants[at_least_one(nc)] = {};
+  /// Numbers of the step that points share, where they do.
+  struct Shared {
+    Lanes theta[nt] = {}, constants[at_least_one(nc)] = {};
 
-    Pack(const Law& law, const ElementView& v, const double (*natural)[kMaxRows], const double* prepared_all,
-         const double* shared_constants, int first) {
-      // Numbers, not lanes: GCC 12 takes lanes that are set one number at a time for uninitialised.
-      double local_numbers[nz][kLanes] = {};
+    Shared(const Law& law, const ElementView& v) {
+      if (v.theta_stride != 0) return;
+      double own[at_least_one(nc)];
+      law.constants(v.theta, v.dt, own);
+      for (int c = 0; c < nt; ++c) theta[c] = broadcast<Lanes>(v.theta[c]);
+      for (int c = 0; c < nc; ++c) constants[c] = broadcast<Lanes>(own[c]);
+    }
+    /// The same for points that have parameters of their own; apart, since they seldom have.
+    [[gnu::noinline]] Shared(const Law& law, const ElementView& v, const int* points) {
+      double theta_numbers[nt][kLanes] = {}, own_numbers[at_least_one(nc)][kLanes] = {};
       for (int k = 0; k < kLanes; ++k) {
-        const bool inside = first + k < v.num_points;
-        const int q = inside ? first + k : v.num_points - 1;
-        for (int a = 0; a < 3; ++a)
-          for (int r = 0; r < 3; ++r) local_numbers[3 * a + r][k] = natural[a][3 * q + r];
-        for (int i = 0; i < 9; ++i) jacobian[i][k] = v.inverse_jacobian[9 * q + i];
-        weight[k] = inside ? v.weight[q] : 0;
-        for (int c = 0; c < np; ++c) prepared[c][k] = prepared_all[q * np + c];
-        const double* th = v.theta + static_cast<std::size_t>(q) * v.theta_stride;
-        for (int c = 0; c < nt; ++c) theta[c][k] = th[c];
-        if (v.theta_stride != 0 && nc > 0) {
-          double own[at_least_one(nc)];
-          law.constants(th, v.dt, own);
-          for (int c = 0; c < nc; ++c) constants[c][k] = own[c];
-        }
+        const double* th = v.theta + static_cast<std::size_t>(points[k]) * v.theta_stride;
+        double own[at_least_one(nc)];
+        law.constants(th, v.dt, own);
+        for (int c = 0; c < nt; ++c) theta_numbers[c][k] = th[c];
+        for (int c = 0; c < nc; ++c) own_numbers[c][k] = own[c];
       }
-      if (v.theta_stride == 0)
-        for (int c = 0; c < nc; ++c) constants[c] = broadcast<Lanes>(shared_constants[c]);
+      for (int c = 0; c < nt; ++c) theta[c] = load_lanes(theta_numbers[c]);
+      for (int c = 0; c < nc; ++c) constants[c] = load_lanes(own_numbers[c]);
+    }
+  };
+
+  /// Points of a pack; past the element's end the last point is repeated with weight 0.
+  struct Pack {
+    Lanes h[nz], y[ne], jacobian[9], weight, prepared[at_least_one(np)];
+
+    Pack(const ElementView& v, const double (*natural)[kMaxPacked], const double* prepared_all,
+         const int* points, int first) {
       Lanes local[nz];
-      static_assert(sizeof local == sizeof local_numbers);
-      std::memcpy(local, local_numbers, sizeof local);
+      for (int i = 0; i < nz; ++i) local[i] = load_lanes(natural[i] + first);
+      load_points<9>(v.inverse_jacobian, points + first, jacobian);
+      if constexpr (np > 0) load_points<np>(prepared_all, points + first, prepared);
+      weight =
+          make_lanes([&](int k) { return first + k < v.num_points ? v.weight[points[first + k]] : 0.0; });
       Kin::to_point(local, jacobian, h);
       Kin::strain(h, y);
     }
@@ -62,41 +71,46 @@ struct PackedKernel {
 
   static double energy(const Law& law, const ElementView& v, const double* u, const double* prepared,
                        double* f) {
-    double natural[3][kMaxRows], out[3][kMaxRows], shared[at_least_one(nc)] = {};
-    if (v.theta_stride == 0) law.constants(v.theta, v.dt, shared);
-    gather<3>(v, u, natural);
+    alignas(8 * kLanes) double natural[nz][kMaxPacked];
+    PackedSums sums(v);
+    fetch(v.inverse_jacobian, 9 * v.num_points);
+    fetch(prepared, np * v.num_points);
+    sums.gather(u, natural);
+    Shared shared(law, v);
     Lanes total = {};
     for (int first = 0; first < v.num_points; first += kLanes) {
-      const Pack p(law, v, natural, prepared, shared, first);
-      if (any_of(!(Kin::det_minus_one_of(p.h) > -1))) return std::numeric_limits<double>::infinity();
-      Lanes sigma[ne];
-      total += p.weight * law.template response<Lanes>(p.y, p.prepared, p.theta, p.constants, sigma, nullptr);
+      const Pack p(v, natural, prepared, sums.points(), first);
+      const Lanes jm1 = Kin::det_minus_one_of(p.h);
+      if (any_of(!(jm1 > -1))) return std::numeric_limits<double>::infinity();
+      if (v.theta_stride != 0) shared = Shared(law, v, sums.points() + first);
+      Lanes mandel[3][3];
+      total +=
+          p.weight * law.template mandel<Lanes>(p.y, jm1, p.prepared, shared.theta, shared.constants, mandel);
       if (!f) continue;
       Lanes piola[nz], local[nz];
-      Kin::strain_transpose(p.h, sigma, piola);
-      Kin::from_point(piola, p.jacobian, p.weight, local);
-      const int count = v.num_points - first < kLanes ? v.num_points - first : kLanes;
-      for (int k = 0; k < count; ++k)
-        for (int a = 0; a < 3; ++a)
-          for (int r = 0; r < 3; ++r) out[a][3 * (first + k) + r] = local[3 * a + r][k];
+      Kin::piola_from_mandel(p.h, mandel, piola);
+      Kin::from_point(piola, p.jacobian, p.weight / (jm1 + 1.0), local);
+      for (int i = 0; i < nz; ++i) store_lanes(local[i], natural[i] + first);
     }
     double sum = 0;
     for (int k = 0; k < kLanes; ++k) sum += total[k];
     if (!std::isfinite(sum)) return std::numeric_limits<double>::infinity();
-    if (f) scatter<3>(v, out, f);
+    if (f) sums.scatter(natural, f);
     return sum;
   }
 
   static bool hessian(const Law& law, const ElementView& v, const double* u, const double* prepared,
                       bool projected, double* work, double* dense) {
     ElementHessian<3> blocks(v, work);
-    double natural[3][kMaxRows], shared[at_least_one(nc)] = {};
-    if (v.theta_stride == 0) law.constants(v.theta, v.dt, shared);
-    gather<3>(v, u, natural);
+    alignas(8 * kLanes) double natural[nz][kMaxPacked];
+    PackedSums sums(v);
+    sums.gather_in_order(u, natural);
+    Shared shared(law, v);
     for (int first = 0; first < v.num_points; first += kLanes) {
-      const Pack p(law, v, natural, prepared, shared, first);
+      const Pack p(v, natural, prepared, sums.points(), first);
+      if (v.theta_stride != 0) shared = Shared(law, v, sums.points() + first);
       Lanes sigma[ne], tangent[ne][ne], a[nz][nz];
-      (void)law.template response<Lanes>(p.y, p.prepared, p.theta, p.constants, sigma, tangent);
+      (void)law.template response<Lanes>(p.y, p.prepared, shared.theta, shared.constants, sigma, tangent);
       material_block(p.h, tangent, a);
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
@@ -114,16 +128,19 @@ struct PackedKernel {
         Kin::from_point(column, p.jacobian, broadcast<Lanes>(1), mapped);
         for (int i = 0; i < nz; ++i) folded[i][j] = mapped[i];
       }
-      double flat[nz * nz * kLanes];
-      std::memcpy(flat, folded, sizeof flat);
-      for (int k = 0; k < count; ++k) blocks.add(first + k, flat + k, kLanes);
+      blocks.add_pack(first, count, folded);
     }
     return blocks.finish(dense);
   }
 
  private:
+  /// Asks for data that are read once per call, long before they are.
+  static void fetch(const double* from, int count) {
+    for (int i = 0; i < count; i += 8) __builtin_prefetch(from + i);
+  }
+
   /// a_(aI)(bJ) = Σ_KL F_aK D_(IK)(JL) F_bL, D the tangent by full index pairs: twice along a diagonal pair.
-  static void material_block(const Lanes* h, const Lanes (*tangent)[ne], Lanes (*a)[nz]) {
+  [[gnu::noinline]] static void material_block(const Lanes* h, const Lanes (*tangent)[ne], Lanes (*a)[nz]) {
     Lanes f[3][3], db[ne][nz];
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) f[i][j] = Kin::deformation(h, i, j);

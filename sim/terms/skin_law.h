@@ -103,6 +103,12 @@ void stress_from(const T (*a)[3], const T* y, T* sigma) {
   }
 }
 
+/// 1/C; 0 where C is as good as 0.
+inline double inverse_stiffening(const double* theta) {
+  const double c = theta[SkinTheta::stiffening];
+  return c > 1e-12 ? 1 / c : 0;
+}
+
 /// Viscoelastic skin. Prepared data: Ĉ^v − I, the history relaxed toward the old configuration.
 struct SkinLaw {
   static constexpr int ne = 6, ns = 6, np = 6, ntheta = 5, nrest = 0;
@@ -156,18 +162,34 @@ struct SkinLaw {
     return psi;
   }
 
-  /// The same in closed form with the tangent (packed_kernel.h); the constant is the damper's weight.
-  static constexpr int num_constants = 1;
+  /// The same in closed form with the tangent (packed_kernel.h); the constants are the damper's weight and 1/C.
+  static constexpr int num_constants = 2;
   void constants(const double* theta, double dt, double* c) const {
     c[0] = damper(scheme, theta[SkinTheta::tau], dt).weight;
+    c[1] = inverse_stiffening(theta);
   }
   template <class V>
   V response(const V* y, const V* prepared, const V* theta, const V* constants, V* sigma,
              V (*tangent)[6]) const {
     clear_response(sigma, tangent);
+    V m[6], x[6];
+    maxwell_strain(y, prepared, m, x);
+    SpringState<V> of_y, of_x;
+    spring_states(y, x, of_y, of_x);
+    const V equilibrium_energy = equilibrium_response(y, of_y, theta, volume, sigma, tangent);
+    return equilibrium_energy +
+           maxwell_response(of_x, m, V(constants[0] * theta[SkinTheta::mu_m]), sigma, tangent);
+  }
+  /// The energy density again, and the Mandel stress M = C S; jm1 = J − 1.
+  template <class V>
+  V mandel(const V* y, const V& jm1, const V* prepared, const V* theta, const V* constants, V (*m)[3]) const {
+    V mean, z[3][3];
+    const LogDeviator<V> d = log_deviator_symmetric(y, mean), e = maxwell_deviator(y, prepared, z);
+    if (any_of(!(d.ordinary & e.ordinary))) return mandel_by_vectors(*this, y, prepared, theta, constants, m);
     const V k = constants[0] * theta[SkinTheta::mu_m];
-    const V equilibrium_energy = equilibrium_response(y, theta, volume, sigma, tangent);
-    return equilibrium_energy + maxwell_response(y, prepared, k, sigma, tangent);
+    const V psi = equilibrium_mandel(y, jm1, d, mean, theta, constants[1], volume, m);
+    add_log_deviator(e, k, z, m);
+    return psi + k * e.square;
   }
 
   template <class T>
@@ -209,12 +231,21 @@ struct ElasticSkinLaw {
     stress_from(a, y, sigma);
     return psi;
   }
-  static constexpr int num_constants = 0;
-  void constants(const double*, double, double*) const {}
+  static constexpr int num_constants = 1;
+  void constants(const double* theta, double, double* c) const { c[0] = inverse_stiffening(theta); }
   template <class V>
   V response(const V* y, const V*, const V* theta, const V*, V* sigma, V (*tangent)[6]) const {
     clear_response(sigma, tangent);
-    return equilibrium_response(y, theta, volume, sigma, tangent);
+    SpringState<V> s;
+    spring_state(y, s);
+    return equilibrium_response(y, s, theta, volume, sigma, tangent);
+  }
+  template <class V>
+  V mandel(const V* y, const V& jm1, const V* prepared, const V* theta, const V* constants, V (*m)[3]) const {
+    V mean;
+    const LogDeviator<V> d = log_deviator_symmetric(y, mean);
+    if (any_of(!d.ordinary)) return mandel_by_vectors(*this, y, prepared, theta, constants, m);
+    return equilibrium_mandel(y, jm1, d, mean, theta, constants[0], volume, m);
   }
 
   template <class T>

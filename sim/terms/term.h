@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/core/cache_line.h"
 #include "sim/core/types.h"
 #include "sim/core/work_count.h"
 #include "sim/terms/kernel_table.h"
@@ -43,10 +44,11 @@ struct ThetaSlot {
 
 /// The factors of a prism's table, where it has them (ProductView has the shapes).
 struct ProductTables {
-  int plane_nodes = 0, padded_plane_nodes = 0, line_nodes = 0, line_points = 0;
-  std::vector<double> plane, line;
+  int plane_nodes = 0, padded_plane_nodes = 0, line_nodes = 0, line_points = 0, padded_plane_rows = 0;
+  CacheLineDoubles plane, line, plane_by_node;
   ProductView view() const {
-    return {plane_nodes, padded_plane_nodes, line_nodes, line_points, plane.data(), line.data()};
+    return {plane_nodes,  padded_plane_nodes, line_nodes,           line_points,
+            plane.data(), line.data(),        plane_by_node.data(), padded_plane_rows};
   }
 };
 

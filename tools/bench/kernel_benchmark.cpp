@@ -198,12 +198,14 @@ class Measurement {
 
  private:
   static double ratio(const Row& r) { return r.seconds > 0 ? r.plain_seconds / r.seconds : 0; }
+  /// Of one core in vectors of the row's instructions; of AVX2 for the portable ones.
+  double peak(std::size_t k) const {
+    return rows_[k].isa == "avx512" ? machines_[k].fma_flops : machines_[k].fma_flops_avx2;
+  }
   /// Of one core's peak, on one thread.
   double share(std::size_t k) const {
     const Row& r = rows_[k];
-    return r.flops > 0 && r.seconds > 0 && machines_[k].fma_flops > 0
-               ? r.flops * r.points / r.seconds / machines_[k].fma_flops
-               : 0;
+    return r.flops > 0 && r.seconds > 0 && peak(k) > 0 ? r.flops * r.points / r.seconds / peak(k) : 0;
   }
   void write() const {
     CsvTable csv({{"kernel", ""},
@@ -224,8 +226,8 @@ class Measurement {
       const Row& r = rows_[k];
       const double per_point = 1e9 / r.points;
       csv.add_row({r.kernel, r.element, r.isa, r.points, r.seconds * per_point, std::int64_t{threads_},
-                   r.seconds_all * per_point, r.plain_seconds * per_point, ratio(r), r.flops,
-                   machines_[k].fma_flops / 1e9, share(k), r.difference,
+                   r.seconds_all * per_point, r.plain_seconds * per_point, ratio(r), r.flops, peak(k) / 1e9,
+                   share(k), r.difference,
                    r.difference_by_points < 0 ? CsvCell(std::string()) : CsvCell(r.difference_by_points)});
     }
     csv.write(folder_ + "/kernels.csv");
@@ -326,8 +328,8 @@ class KernelBenchmark : public Benchmark {
         "eigensolver, a dense B^T D B) compiled for the same instruction set, on one thread. Before that "
         "both "
         "must agree to 1e-10. Operations are counted, not estimated, and set beside the fused multiply-adds "
-        "of "
-        "AVX2 that one core does in the same run. Writes kernels.csv and kernels.md into -o DIR."};
+        "that one core does in the same run in vectors of the same width (of AVX2 for portable kernels). "
+        "Writes kernels.csv and kernels.md into -o DIR."};
   }
   void add_options(CLI::App& app) override {
     app.add_option("--cells", cells_, "the patch has N x N squares of two elements (default 12)")
@@ -347,6 +349,9 @@ class KernelBenchmark : public Benchmark {
     std::vector<Compiled> compiled = {{"baseline", skin_kernels_of("baseline"), &plain_skin_baseline}};
 #ifdef RHYTID_HAVE_AVX2
     compiled.push_back({"avx2", skin_kernels_of("avx2"), &plain_skin_avx2});
+#endif
+#ifdef RHYTID_HAVE_AVX512
+    compiled.push_back({"avx512", skin_kernels_of("avx512"), &plain_skin_avx512});
 #endif
     const KernelCases p4(4, 2, cells_), p3(3, 3, cells_);
     for (const KernelCases* all : {&p4, &p3}) {

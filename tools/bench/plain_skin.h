@@ -22,9 +22,7 @@ struct PlainSkin {
                   double* dense);
 };
 
-extern const PlainSkin plain_skin_baseline;
-#ifdef RHYTID_HAVE_AVX2
-extern const PlainSkin plain_skin_avx2;
-#endif
+/// Those of instruction sets that this build lacks are declared only.
+extern const PlainSkin plain_skin_baseline, plain_skin_avx2, plain_skin_avx512;
 
 }  // namespace rhytid::tools

@@ -57,9 +57,16 @@ Counted select(bool condition, const Counted& a, const Counted& b) {
 Counted lane_sqrt(const Counted& a) {
   return counted(std::sqrt(a.v));
 }
-template <class F>
-Counted map_lanes(F f, const Counted& a) {
-  return counted(f(a.v));
+Counted lane_log1p(const Counted& a) {
+  return counted(std::log1p(a.v));
+}
+Counted lane_expm1(const Counted& a) {
+  return counted(std::expm1(a.v));
+}
+/// A logarithm; the quotient.
+LogQuotients<Counted> log_quotients(const Counted& a, const Counted& b, const Counted& difference) {
+  const LogQuotients<double> q = rhytid::log_quotients(a.v, b.v, difference.v);
+  return {counted(q.log), counted(q.slope)};
 }
 
 using Kin = PrismKinematics;
@@ -73,11 +80,11 @@ SkinOperations count_skin_operations(const SkinLaw& law, const ElementView& view
   gather<3>(view, u, natural);
   double constants[SkinLaw::num_constants];
   law.constants(view.theta, view.dt, constants);
-  const Counted constant = constants[0];
   SkinOperations total;
   for (int q = 0; q < view.num_points; ++q) {
-    Counted local[9], jacobian[9], h[9], y[6], history[6], theta[5], sigma[6], tangent[6][6], piola[9],
-        out[9];
+    Counted local[9], jacobian[9], h[9], y[6], history[6], theta[5], mandel[3][3], sigma[6], tangent[6][6],
+        piola[9], out[9], of_step[SkinLaw::num_constants];
+    for (int c = 0; c < SkinLaw::num_constants; ++c) of_step[c] = constants[c];
     for (int a = 0; a < 3; ++a)
       for (int r = 0; r < 3; ++r) local[3 * a + r] = natural[a][3 * q + r];
     for (int i = 0; i < 9; ++i) jacobian[i] = view.inverse_jacobian[9 * q + i];
@@ -94,17 +101,21 @@ SkinOperations count_skin_operations(const SkinLaw& law, const ElementView& view
       Kin::strain(h, y);
     });
     total.residual += strain + count([&] {
-                        (void)Kin::det_minus_one_of(h);
-                        (void)law.response<Counted>(y, history, theta, &constant, sigma, nullptr);
-                        Kin::strain_transpose(h, sigma, piola);
-                        Kin::from_point(piola, jacobian, weight, out);
+                        const Counted jm1 = Kin::det_minus_one_of(h);
+                        (void)law.mandel<Counted>(y, jm1, history, theta, of_step, mandel);
+                        Kin::piola_from_mandel(h, mandel, piola);
+                        Kin::from_point(piola, jacobian, weight / (jm1 + 1.0), out);
                       });
-    total.hessian +=
-        strain + count([&] { (void)law.response<Counted>(y, history, theta, &constant, sigma, tangent); }) +
-        18 * count([&] { Kin::from_point(piola, jacobian, weight, out); });
+    total.hessian += strain +
+                     count([&] { (void)law.response<Counted>(y, history, theta, of_step, sigma, tangent); }) +
+                     18 * count([&] { Kin::from_point(piola, jacobian, weight, out); });
   }
   const double n = view.num_nodes;
-  const double sums = 2 * 9 * n;  // nodes to points, or back: three components of three directions
+  double sums = 2 * 9 * n;  // nodes to points, or back: three components of three directions
+  if (view.product.line_points > 0) {
+    const double nl = view.product.line_nodes, np = view.product.plane_nodes;
+    sums = 2 * 9 * (nl * np / view.product.line_points + nl);  // over the plane, then along the line
+  }
   // Material block: [6][9] and [9][9] sums of three products; geometric part.
   const double block = 2 * 3 * (6 * 9 + 9 * 9) + 27;
   // Left factors: six blocks (a ≤ b) of three rows; products: three full blocks and three upper halves.

@@ -3,7 +3,8 @@
 // The count does not depend on the instruction set: the law and the kinematics run once per point with a number that counts
 // its own additions, subtractions, multiplications, divisions and square roots as one each, and a logarithm or an
 // exponential as one too (which take some twenty). Sums over nodes and the dense products of the Hessian are counted by
-// their sizes, without padding, one direction at a time where the kernels sum so (product_hessian.h); a symmetric block by its upper half. So it is a lower bound of what is executed.
+// their sizes, without padding, one direction at a time where the kernels sum so (packed_sums.h, product_hessian.h); a
+// symmetric block by its upper half. So it is a lower bound of what is executed.
 #pragma once
 
 #include "sim/terms/element_view.h"

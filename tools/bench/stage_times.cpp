@@ -24,10 +24,10 @@ class NoSink final : public Term::MatrixSink {
 };
 
 #if defined(__x86_64__)
-/// Twelve independent chains of AVX2 fused multiply-adds; returns a number that depends on all.
-__attribute__((target("avx2,fma"))) double multiply_add_chains(long rounds) {
-  typedef double Pack __attribute__((vector_size(32)));
-  Pack sum[12], factor = {0.999, 0.998, 0.997, 0.996};
+/// Twelve independent chains of fused multiply-adds of packs; returns a number that depends on all.
+template <class Pack>
+[[gnu::always_inline]] inline double multiply_add_chains(long rounds) {
+  Pack sum[12], factor = Pack{} + 0.999;
   for (int k = 0; k < 12; ++k) sum[k] = factor * (k + 1.0);
   for (long i = 0; i < rounds; ++i)
     for (int k = 0; k < 12; ++k) sum[k] = sum[k] * factor + factor;
@@ -35,28 +35,42 @@ __attribute__((target("avx2,fma"))) double multiply_add_chains(long rounds) {
   for (int k = 0; k < 12; ++k) total += sum[k][0] + sum[k][3];
   return total;
 }
+typedef double PackAvx2 __attribute__((vector_size(32)));
+typedef double PackAvx512 __attribute__((vector_size(64)));
+__attribute__((target("avx2,fma"))) double chains_avx2(long rounds) {
+  return multiply_add_chains<PackAvx2>(rounds);
+}
+__attribute__((target("avx512f,fma,prefer-vector-width=512"))) double chains_avx512(long rounds) {
+  return multiply_add_chains<PackAvx512>(rounds);
+}
+
+/// Operations per second of `threads` threads that run `chains` of packs of `width` at once.
+double fma_rate(double (*chains)(long), int width, int threads) {
+  constexpr long rounds = 200'000;
+  constexpr int repeats = 50;
+  std::vector<double> rates(static_cast<std::size_t>(threads)), kept = rates;
+  parallel_for(threads, [&](std::int64_t t) {
+    const auto at = static_cast<std::size_t>(t);
+    for (int k = 0; k < repeats; ++k) {
+      const double start = thread_seconds();
+      kept[at] += chains(rounds);
+      rates[at] = std::max(rates[at], 12. * width * 2 * rounds / (thread_seconds() - start));
+    }
+  });
+  volatile double seen = kept[0];
+  (void)seen;
+  return std::accumulate(rates.begin(), rates.end(), 0.);
+}
 #endif
 
-double fma_rate(int threads) {
+void measure_fma_rates(int threads, MachineLimits& limits) {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-    constexpr long rounds = 200'000;
-    constexpr int repeats = 50;
-    std::vector<double> rates(static_cast<std::size_t>(threads)), kept = rates;
-    parallel_for(threads, [&](std::int64_t t) {
-      const auto at = static_cast<std::size_t>(t);
-      for (int k = 0; k < repeats; ++k) {
-        const double start = thread_seconds();
-        kept[at] += multiply_add_chains(rounds);
-        rates[at] = std::max(rates[at], 12. * 4 * 2 * rounds / (thread_seconds() - start));
-      }
-    });
-    volatile double seen = kept[0];
-    (void)seen;
-    return std::accumulate(rates.begin(), rates.end(), 0.);
-  }
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    limits.fma_flops = limits.fma_flops_avx2 = fma_rate(chains_avx2, 4, threads);
+  if (__builtin_cpu_supports("avx512f")) limits.fma_flops = fma_rate(chains_avx512, 8, threads);
+#else
+  (void)threads, (void)limits;
 #endif
-  return 0;
 }
 
 double read_rate(int threads) {
@@ -102,7 +116,9 @@ SkinOperations operations_of(const Term& term, const StepInfo& step, const TermS
 MachineLimits measure_machine_limits(int threads) {
   const int before = num_threads();
   set_num_threads(threads);
-  const MachineLimits limits = {fma_rate(threads), read_rate(threads)};
+  MachineLimits limits;
+  measure_fma_rates(threads, limits);
+  limits.read_bandwidth = read_rate(threads);
   set_num_threads(before);
   return limits;
 }

@@ -25,7 +25,8 @@ struct StageTime {
 
 /// What this machine can do, measured now: the best of repeats.
 struct MachineLimits {
-  double fma_flops = 0;       ///< 1/s, of independent fused multiply-adds of AVX2; 0 without
+  double fma_flops = 0;  ///< 1/s, of independent fused multiply-adds in the widest vectors; 0 without AVX2
+  double fma_flops_avx2 = 0;  ///< 1/s, the same in vectors of AVX2
   double read_bandwidth = 0;  ///< bytes/s, reading an array far larger than the caches
 };
 /// By as many threads at once.

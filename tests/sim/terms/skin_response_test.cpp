@@ -78,7 +78,7 @@ double by_duals(const Law& law, const Point& p, Vec6& sigma, Tangent& tangent) {
 
 template <class Law>
 double in_closed_form(const Law& law, const Point& p, Vec6& sigma, Tangent& tangent) {
-  double constants[1], d[6][6];
+  double constants[Law::num_constants], d[6][6];
   law.constants(p.theta.data(), kDt, constants);
   const double psi =
       law.template response<double>(p.y.data(), p.history.data(), p.theta.data(), constants, sigma.data(), d);
@@ -114,12 +114,12 @@ TEST(SkinResponse, PackIsLaneByLaneTheSingle) {
   const std::vector<Point> all = points();
   const SkinLaw law;
   for (std::size_t first = 0; first + kLanes <= all.size(); first += kLanes) {
-    Lanes y[6], history[6], theta[5], constants[1], sigma[6], tangent[6][6];
+    Lanes y[6], history[6], theta[5], constants[SkinLaw::num_constants], sigma[6], tangent[6][6];
     for (int k = 0; k < kLanes; ++k) {
       const Point& p = all[first + k];
-      double c;
-      law.constants(p.theta.data(), kDt, &c);
-      constants[0][k] = c;
+      double c[SkinLaw::num_constants];
+      law.constants(p.theta.data(), kDt, c);
+      for (int i = 0; i < SkinLaw::num_constants; ++i) constants[i][k] = c[i];
       for (int i = 0; i < 6; ++i) y[i][k] = p.y[i], history[i][k] = p.history[i];
       for (int i = 0; i < 5; ++i) theta[i][k] = p.theta[i];
     }

@@ -13,10 +13,15 @@
 #include "sim/terms/term.h"
 
 namespace rhytid {
-extern const KernelTable skin_table_baseline, elastic_table_baseline, skin_table_avx2, elastic_table_avx2,
-    volume_table_baseline, volume_table_avx2, pre_stretched_skin_table_baseline,
-    pre_stretched_skin_table_avx2, pre_stretched_elastic_table_baseline, pre_stretched_elastic_table_avx2;
-}
+// Those that this build has: tests ask has_instructions() before they use one.
+#define RHYTID_DECLARE_TABLES(isa)                                                    \
+  extern const KernelTable skin_table_##isa, elastic_table_##isa, volume_table_##isa, \
+      pre_stretched_skin_table_##isa, pre_stretched_elastic_table_##isa;
+RHYTID_DECLARE_TABLES(baseline)
+RHYTID_DECLARE_TABLES(avx2)
+RHYTID_DECLARE_TABLES(avx512)
+#undef RHYTID_DECLARE_TABLES
+}  // namespace rhytid
 
 namespace rhytid::test {
 

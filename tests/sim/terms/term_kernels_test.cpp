@@ -1,14 +1,37 @@
 // The element kernels of every term against each other and against difference quotients: gradient, Hessian,
-// projection, tangent blocks, their transposes, and the two instruction sets.
+// projection, tangent blocks, their transposes, and the instruction sets.
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 
+#include "sim/terms/kernel_choice.h"
 #include "term_cases.h"
 #include "tests/support/convergence.h"
 
 namespace rhytid::test {
 namespace {
+
+/// The prism kernels of one instruction set.
+struct PrismTables {
+  std::string isa;
+  const KernelTable &skin, &elastic, &volume, &pre_stretched_skin, &pre_stretched_elastic;
+};
+#define RHYTID_PRISM_TABLES(isa)                                                                     \
+  PrismTables {                                                                                      \
+#isa, skin_table_##isa, elastic_table_##isa, volume_table_##isa, pre_stretched_skin_table_##isa, \
+        pre_stretched_elastic_table_##isa                                                            \
+  }
+/// All that this machine and build have, the portable ones first.
+std::vector<PrismTables> instruction_sets() {
+  std::vector<PrismTables> all = {RHYTID_PRISM_TABLES(baseline)};
+#ifdef RHYTID_HAVE_AVX2
+  if (has_instructions("avx2")) all.push_back(RHYTID_PRISM_TABLES(avx2));
+#endif
+#ifdef RHYTID_HAVE_AVX512
+  if (has_instructions("avx512")) all.push_back(RHYTID_PRISM_TABLES(avx512));
+#endif
+  return all;
+}
 
 std::vector<TermCase> all_cases() {
   std::vector<TermCase> cases;
@@ -76,7 +99,7 @@ TEST(TermKernels, GradientAndHessianByOrder) {
   }
 }
 
-void expect_product_sum_is_sum_by_points(const TermCase& c) {
+void expect_product_sums_are_sums_by_points(const TermCase& c) {
   Term by_points = c.term();
   for (TermGroup& g : by_points.groups()) {
     EXPECT_GT(g.product.line_points, 0);
@@ -84,6 +107,10 @@ void expect_product_sum_is_sum_by_points(const TermCase& c) {
   }
   TermStepData data;
   c.term().prepare(c.step, c.native, c.u_old, c.history.data(), data);
+  VectorXd g = VectorXd::Zero(c.u.size()), wanted = g;
+  const double energy = c.term().energy(c.step, data, c.u, &g, nullptr);
+  EXPECT_NEAR(energy, by_points.energy(c.step, data, c.u, &wanted, nullptr), 1e-14 * energy);
+  EXPECT_LE((g - wanted).norm(), 1e-14 * wanted.norm());
   for (const bool projected : {false, true}) {
     DenseSink product(static_cast<int>(c.u.size())), points = product;
     c.term().hessian(c.step, data, c.u, projected, product);
@@ -92,20 +119,17 @@ void expect_product_sum_is_sum_by_points(const TermCase& c) {
   }
 }
 
-/// Every order, since line nodes fill packs differently, and both instruction sets, whose packs differ.
-TEST(TermKernels, ProductSumOfTheHessianIsTheSumPointByPoint) {
-  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  for (int p = 1; p <= 4; ++p)
-    for (int q = 1; q <= 4; ++q) {
-      SCOPED_TRACE("p = " + std::to_string(p) + ", q = " + std::to_string(q));
-      const double amount = p == 4 ? 0.03 : 0.1;
-      expect_product_sum_is_sum_by_points(
-          skin_case(elastic_table_baseline, false, DamperScheme::exponential, p, q, amount));
-      if (has_avx2)
-        expect_product_sum_is_sum_by_points(
-            skin_case(elastic_table_avx2, false, DamperScheme::exponential, p, q, amount));
-    }
-  expect_product_sum_is_sum_by_points(volume_case(volume_table_baseline, 2, 2));
+/// Every order, since line nodes fill packs differently, and all instruction sets, whose packs differ.
+TEST(TermKernels, ProductSumsAreTheSumsPointByPoint) {
+  for (const PrismTables& tables : instruction_sets())
+    for (int p = 1; p <= 4; ++p)
+      for (int q = 1; q <= 4; ++q) {
+        SCOPED_TRACE(tables.isa + ", p = " + std::to_string(p) + ", q = " + std::to_string(q));
+        const double amount = p == 4 ? 0.03 : 0.1;
+        expect_product_sums_are_sums_by_points(
+            skin_case(tables.elastic, false, DamperScheme::exponential, p, q, amount));
+      }
+  expect_product_sums_are_sums_by_points(volume_case(volume_table_baseline, 2, 2));
 }
 
 TEST(TermKernels, TangentBlocksByOrder) {
@@ -234,26 +258,26 @@ TEST(TermKernels, ProjectedHessianIsSemidefiniteAndEqualsRawWhenRawIs) {
   EXPECT_LE((projected.matrix - raw.matrix).norm(), 1e-12 * raw.matrix.norm());
 }
 
-#ifdef RHYTID_HAVE_AVX2
 TEST(TermKernels, InstructionSetsAgree) {
-  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) GTEST_SKIP() << "no AVX2 here";
+  const std::vector<PrismTables> sets = instruction_sets();
+  if (sets.size() == 1) GTEST_SKIP() << "portable kernels only";
   Rng rng(8);
   constexpr int D = kDirections;
   std::vector<std::pair<TermCase, TermCase>> pairs;
-  for (bool viscous : {true, false}) {
-    for (const auto& [p, q] : {std::pair{1, 1}, {2, 2}, {4, 3}}) {
-      const auto one = [&, p = p, q = q](const KernelTable& table) {
-        return skin_case(table, viscous, DamperScheme::exponential, p, q, p == 4 ? 0.03 : 0.2);
-      };
-      pairs.emplace_back(one(viscous ? skin_table_avx2 : elastic_table_avx2),
-                         one(viscous ? skin_table_baseline : elastic_table_baseline));
+  for (std::size_t k = 1; k < sets.size(); ++k) {
+    const auto add = [&](auto&& make) { pairs.emplace_back(make(sets[k]), make(sets[0])); };
+    for (bool viscous : {true, false}) {
+      for (const auto& [p, q] : {std::pair{1, 1}, {2, 2}, {4, 3}})
+        add([&, p = p, q = q](const PrismTables& t) {
+          return skin_case(viscous ? t.skin : t.elastic, viscous, DamperScheme::exponential, p, q,
+                           p == 4 ? 0.03 : 0.2);
+        });
+      add([&](const PrismTables& t) {
+        return pre_stretched_case(viscous ? t.pre_stretched_skin : t.pre_stretched_elastic, viscous, 2, 2);
+      });
     }
-    const auto stretched = [&](const KernelTable& table) { return pre_stretched_case(table, viscous, 2, 2); };
-    pairs.emplace_back(
-        stretched(viscous ? pre_stretched_skin_table_avx2 : pre_stretched_elastic_table_avx2),
-        stretched(viscous ? pre_stretched_skin_table_baseline : pre_stretched_elastic_table_baseline));
+    add([](const PrismTables& t) { return volume_case(t.volume, 2, 2); });
   }
-  pairs.emplace_back(volume_case(volume_table_avx2, 2, 2), volume_case(volume_table_baseline, 2, 2));
   for (const auto& [a, b] : pairs) {
     SCOPED_TRACE(a.name + ", p = " + std::to_string(a.mesh.order));
     const int nu = static_cast<int>(a.u.size()), nh = static_cast<int>(a.history.size());
@@ -298,7 +322,6 @@ TEST(TermKernels, InstructionSetsAgree) {
           << (results[0][k] - results[1][k]).norm() / results[1][k].norm();
   }
 }
-#endif
 
 }  // namespace
 }  // namespace rhytid::test
