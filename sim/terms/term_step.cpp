@@ -62,12 +62,12 @@ void Term::hessian(const StepInfo& step, const TermStepData& data, const VectorX
     };
     // Kept for the next call: fresh pages cost a tenth of the elements.
     thread_local Chunk kept[2];
-    Chunk* const chunks = kept;  // of this thread, for all that work on it
+    Chunk* const chunks = kept;             // of this thread, for all that work on it
+    chunks[0].count = chunks[1].count = 0;  // what an earlier call left is not added again
     for (int turn = 0; turn < (g.num_elements > chunk ? 2 : 1); ++turn) {
       const std::size_t needed = size * static_cast<std::size_t>(chunk);
       if (chunks[turn].dense.size() < needed) chunks[turn].dense.resize(needed);
       chunks[turn].present.resize(static_cast<std::size_t>(chunk));
-      chunks[turn].count = 0;
     }
     const auto add = [&](Chunk& c) {
       for (int k = 0; k < c.count; ++k)

@@ -45,10 +45,11 @@ expect 0 kernels --cells 1 --seconds 0 -o "$folder/kernels"
 column "$folder/kernels/kernels.csv" difference |
   awk '!($1 < 1e-10) { bad = 1 } $1 > 0 { differ = 1 } END { exit bad || !differ || NR < 17 }' || fail "kernels and plain references"
 column "$folder/kernels/kernels.csv" time_per_point_ns | awk '!($1 > 0) { exit 1 }' || fail "times of kernels"
-# (36 operations per node and point for the sums alone, P4 x P2 has 45 nodes; the law takes some hundreds.)
+# (Sums over all nodes would take 36 operations per node and point, P4 x P2 has 45 nodes; one direction at a time
+# they take fewer, and the law takes some hundreds.)
 grep '^skin: residual,P4 x P2,baseline,' "$folder/kernels/kernels.csv" | head -1 >"$folder/row"
 cat <(head -1 "$folder/kernels/kernels.csv") "$folder/row" >"$folder/one.csv"
-column "$folder/one.csv" flops_per_point | awk '!($1 > 36 * 45 + 300 && $1 < 36 * 45 + 3000) { exit 1 }' || fail "operations counted"
+column "$folder/one.csv" flops_per_point | awk '!($1 > 700 && $1 < 36 * 45 + 300) { exit 1 }' || fail "operations counted"
 
 # Features cost nothing where they are not; the settling step of tension and substeps are steps.
 expect 0 features --nodes 600 --frames 2 --repeats 1 --starts 1 -o "$folder/features"
