@@ -16,6 +16,7 @@
 #include "fitting/calibration_files.h"
 #include "fitting/utf8.h"
 #include "sim/core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -124,11 +125,8 @@ std::array<double, kNumLensParameters> values_of(const Camera& c) {
 
 class CalibrationFiles : public ::testing::Test {
  protected:
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() /
-      ("rhytid_calibration_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-  CalibrationFiles() { std::filesystem::create_directories(folder_); }
-  ~CalibrationFiles() override { std::filesystem::remove_all(folder_); }
+  const test::TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path();
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
 };
 

@@ -5,12 +5,12 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <opencv2/calib3d.hpp>
 #include <random>
 
 #include "sim/core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -57,12 +57,8 @@ class CameraFile : public ::testing::Test {
     }
     return "accepted";
   }
-  std::string path_ =
-      (std::filesystem::temp_directory_path() /
-       ("rhytid_camera_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
-        ".yml"))
-          .string();
-  ~CameraFile() override { std::filesystem::remove(path_); }
+  const test::TemporaryFolder folder_;
+  const std::string path_ = folder_ / "camera.yml";
 };
 
 constexpr char kSize[] = "image_size: [ 640, 480 ]\n";

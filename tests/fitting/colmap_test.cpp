@@ -9,6 +9,7 @@
 
 #include "fitting/case_camera.h"
 #include "sim/core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -19,12 +20,8 @@ using ::testing::HasSubstr;
 
 class Colmap : public ::testing::Test {
  protected:
-  std::string folder_ =
-      (std::filesystem::temp_directory_path() /
-       ("rhytid_colmap_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name())))
-          .string();
-  Colmap() { std::filesystem::create_directories(folder_); }
-  ~Colmap() override { std::filesystem::remove_all(folder_); }
+  const test::TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
 
   void write(const std::string& cameras, const std::string& images) const {
     std::ofstream(folder_ + "/cameras.txt") << cameras;

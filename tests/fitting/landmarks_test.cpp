@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
-#include <filesystem>
 #include <random>
 
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -165,7 +165,8 @@ TEST(Landmarks, TooFewOrOnALineAreRefused) {
 }
 
 TEST(Landmarks, FileIsReadAndItsErrorsNamed) {
-  const std::string path = (std::filesystem::temp_directory_path() / "rhytid_landmarks.csv").string();
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "landmarks.csv";
   const auto vertex = [](long index) {
     if (index > 9) throw InputError("a vertex of the mesh, 0 to 9");
     return Vec3(static_cast<double>(index), 2, 3);
@@ -205,7 +206,6 @@ TEST(Landmarks, FileIsReadAndItsErrorsNamed) {
   EXPECT_EQ(read(header + "Nasenfl\xc3\xbcgel,1,2,3\n")[0].name, "Nasenfl\xc3\xbcgel");
   EXPECT_THAT(message(header + "a,1,2,3\nNasenfl\xfcgel,1,2,3\n"),
               testing::AllOf(HasSubstr(path + ":3: got name 'Nasenfl"), HasSubstr("expected text in UTF-8")));
-  std::filesystem::remove(path);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "sim/core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -34,12 +35,8 @@ class TracksFile : public ::testing::Test {
     }
     return "accepted";
   }
-  std::string path_ =
-      (std::filesystem::temp_directory_path() /
-       ("rhytid_tracks_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
-        ".csv"))
-          .string();
-  ~TracksFile() override { std::filesystem::remove(path_); }
+  const test::TemporaryFolder folder_;
+  const std::string path_ = folder_ / "tracks.csv";
 };
 
 TEST_F(TracksFile, ReadsBackTheSameBits) {

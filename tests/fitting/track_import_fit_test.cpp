@@ -2,11 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
-#include <filesystem>
 
 #include "fitting/fit.h"
 #include "fitting/track_export.h"
 #include "tests/fitting/synthetic_tracks.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -25,16 +25,14 @@ TEST(ImportedTracks, AFitFindsTheSameNumbers) {
   const FitResult own = run_fit(input);
   ASSERT_TRUE(own.converged);
 
-  const std::filesystem::path folder = std::filesystem::temp_directory_path() / "rhytid_imported_tracks";
-  std::filesystem::create_directories(folder);
+  const rhytid::test::TemporaryFolder folder;
   for (const TrackFormat format : {TrackFormat::dice, TrackFormat::opencorr}) {
     TrackImportOptions options;
     options.frame_rate = 24;
     options.camera = camera.name;
     if (format == TrackFormat::opencorr) options.sigma = 0.02 * std::sqrt(2.0);  // of a displacement
     TrackImportReport report;
-    input.tracks =
-        import_tracks(export_tracks(input.tracks, format, folder.string()).files, options, &report);
+    input.tracks = import_tracks(export_tracks(input.tracks, format, folder.path()).files, options, &report);
     const FitResult imported = run_fit(input);
     ASSERT_TRUE(imported.converged);
     const FittedParameter &a = own.parameters.at(0), &b = imported.parameters.at(0);
@@ -45,7 +43,6 @@ TEST(ImportedTracks, AFitFindsTheSameNumbers) {
     EXPECT_NEAR(b.high95, a.high95, 1e-6 * a.high95);
     EXPECT_NEAR(imported.final_cost, own.final_cost, 1e-7 * own.final_cost);
   }
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

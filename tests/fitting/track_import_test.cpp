@@ -11,6 +11,7 @@
 #include "fitting/numbered_files.h"
 #include "fitting/track_export.h"
 #include "sim/core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -20,16 +21,11 @@ using ::testing::HasSubstr;
 
 class TrackImport : public ::testing::Test {
  protected:
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() /
-      ("rhytid_import_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+  const test::TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path();
   TrackImportOptions options_;
   TrackImportReport report_;
-  TrackImport() {
-    std::filesystem::create_directories(folder_);
-    options_.frame_rate = 20;
-  }
-  ~TrackImport() override { std::filesystem::remove_all(folder_); }
+  TrackImport() { options_.frame_rate = 20; }
 
   std::string write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name) << text;

@@ -3,11 +3,10 @@
 
 #include <gmock/gmock.h>
 
-#include <filesystem>
-
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "tests/support/small_scenes.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/study/study_run.h"
 
 namespace rhytid::tools {
@@ -34,8 +33,6 @@ std::string refusal(Call call) {
 
 class TableFile : public testing::Test {
  protected:
-  TableFile() : path_((std::filesystem::temp_directory_path() / "rhytid_parameter_sets.csv").string()) {}
-  ~TableFile() override { std::filesystem::remove(path_); }
   std::vector<ParameterSet> read(const std::string& text) {
     write_file(path_, text);
     return table_sets(path_);
@@ -43,7 +40,8 @@ class TableFile : public testing::Test {
   std::string error_of(const std::string& text) {
     return refusal([&] { read(text); });
   }
-  std::string path_;
+  const test::TemporaryFolder folder_;
+  const std::string path_ = folder_ / "parameter_sets.csv";
 };
 
 TEST(GridSets, AreAllCombinationsTheLastRunningFastest) {

@@ -2,12 +2,12 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <filesystem>
 #include <limits>
 
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "tests/support/small_scenes.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/bench/pareto_report.h"
 #include "tools/study/experiment.h"
 
@@ -60,18 +60,14 @@ TEST(ParetoErrors, AreRootMeanSquaresOverWhatBothHave) {
 
 class ParetoFile : public testing::Test {
  protected:
-  ParetoFile() : folder_((std::filesystem::temp_directory_path() / "rhytid_pareto_file").string()) {
-    std::filesystem::create_directories(folder_);
-    write_file(folder_ + "/scene.json", test::drag_scene(1, 1));
-  }
-  ~ParetoFile() override { std::filesystem::remove_all(folder_); }
+  ParetoFile() { write_file(folder_ / "scene.json", test::drag_scene(1, 1)); }
 
   Experiment load(const std::string& groups, const std::string& size = "[8, 6]") const {
-    write_file(folder_ + "/pareto.json",
+    write_file(folder_ / "pareto.json",
                R"({"scene": "scene.json", "compare": {"window": {"centre": [0, 0, 0], "size": )" + size +
                    R"(}, "groups": [)" + groups + R"(]},
       "variants": [{"name": "coarse"}, {"name": "fine"}, {"name": "finer", "size": "full"}]})");
-    return load_experiment(folder_ + "/pareto.json", StudySize::quick);
+    return load_experiment(folder_ / "pareto.json", StudySize::quick);
   }
   std::string refusal(const std::string& groups, const std::string& size = "[8, 6]") const {
     try {
@@ -82,7 +78,7 @@ class ParetoFile : public testing::Test {
     return "";
   }
 
-  std::string folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(ParetoFile, GroupsCompareVariantsThatAreRun) {

@@ -11,6 +11,7 @@
 #include "sim/mesh/triangle_surface.h"
 #include "sim/output/atomic_file.h"
 #include "tests/support/small_scenes.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -29,9 +30,7 @@ struct Call {
 /// A folder with the drag scene, a case, and a lens; landmarks are vertices of the scene's grid.
 class Place {
  public:
-  Place() : folder_((std::filesystem::temp_directory_path() / "rhytid_register").string()) {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
+  Place() {
     write_file(at("scene.json"), test::drag_scene(1, 1));
     write_file(at("case.json"), R"({"scene": "scene.json", "camera": "lens.yaml"})");
     camera.intrinsics << 900, 0, 320, 0, 900, 240, 0, 0, 1;
@@ -43,8 +42,7 @@ class Place {
         (Eigen::AngleAxisd(2.6, Vec3::UnitX()) * Eigen::AngleAxisd(0.4, Vec3::UnitY())).toRotationMatrix();
     camera.translation = {1, -1, 40};
   }
-  ~Place() { std::filesystem::remove_all(folder_); }
-  std::string at(const std::string& file) const { return folder_ + "/" + file; }
+  std::string at(const std::string& file) const { return folder_ / file; }
 
   /// Every fourth vertex of the grid, where the camera sees it; "wrong" is off by 9 px.
   std::string landmarks(bool with_wrong) const {
@@ -79,7 +77,7 @@ class Place {
   fitting::Camera camera;
 
  private:
-  std::string folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST(Register, PlacesTheCameraAndDrawsTheMesh) {

@@ -51,7 +51,7 @@ TEST(ParameterRange, IsEvenInTheCoordinate) {
 }
 
 TEST(ParameterRange, TablesAreRefusedWithTheLine) {
-  const StudyPlace place("ranges");
+  const StudyPlace place;
   const Scene scene = load_scene(place.at("scene.json"));
   const auto error_of = [&](const std::string& text) -> std::string {
     write_file(place.at("ranges.csv"), text);
@@ -101,7 +101,7 @@ std::vector<std::string> with(std::vector<std::string> list, const std::vector<s
 }
 
 TEST(Screen, RanksParametersAndKeepsItsRuns) {
-  const StudyPlace place("screen");
+  const StudyPlace place;
   const StudyCall first = place.call("screen", "scene.json", kTwoParameters);
   ASSERT_EQ(first.code, 0) << first.err;
   for (const char* file :
@@ -153,7 +153,7 @@ TEST(Screen, RanksParametersAndKeepsItsRuns) {
 }
 
 TEST(Screen, ShardsTogetherMakeTheWhole) {
-  const StudyPlace place("screen_shards"), whole("screen_whole");
+  const StudyPlace place, whole;
   ASSERT_EQ(whole.call("screen", "scene.json", kTwoParameters).code, 0);
   const StudyCall part = place.call("screen", "scene.json", with(kTwoParameters, {"--shard", "1/2"}));
   EXPECT_EQ(part.code, 0) << part.err;
@@ -167,7 +167,7 @@ TEST(Screen, ShardsTogetherMakeTheWhole) {
 }
 
 TEST(Screen, SobolIndicesOfAPairThroughTheVerb) {
-  const StudyPlace place("screen_sobol");
+  const StudyPlace place;
   const StudyCall call =
       place.call("screen", "scene.json", with(kTwoParameters, {"--sobol", "4", "--factor", "1.5"}));
   ASSERT_EQ(call.code, 0) << call.err;
@@ -179,7 +179,7 @@ TEST(Screen, SobolIndicesOfAPairThroughTheVerb) {
 }
 
 TEST(Screen, RunsThatDoNotConvergeAreCountedAndLeftOut) {
-  const StudyPlace place("screen_hopeless");
+  const StudyPlace place;
   const StudyCall call = place.call(
       "screen", "scene.json",
       with(kTwoParameters, {"--set", "/solver/max_iterations=1", "--set", "/time/max_bisections=0"}));
@@ -190,7 +190,7 @@ TEST(Screen, RunsThatDoNotConvergeAreCountedAndLeftOut) {
 }
 
 TEST(Screen, RefusesInOneLine) {
-  const StudyPlace place("screen_refused");
+  const StudyPlace place;
   const auto error_of = [&](const std::vector<std::string>& more) {
     const StudyCall call = place.call("screen", "scene.json", more);
     EXPECT_EQ(call.code, 2) << call.err;

@@ -8,6 +8,7 @@
 
 #include "sim/output/atomic_file.h"
 #include "tests/support/small_scenes.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -35,16 +36,8 @@ inline StudyCall call_study(std::vector<std::string> arguments) {
 /// A folder of its own for a test, with a small scene of two frames in it, gone afterwards.
 class StudyPlace {
  public:
-  explicit StudyPlace(const std::string& name)
-      : folder_((std::filesystem::temp_directory_path() / ("rhytid_" + name)).string()) {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-    write_file(at("scene.json"), test::drag_scene(2, 2));
-  }
-  ~StudyPlace() { std::filesystem::remove_all(folder_); }
-  StudyPlace(const StudyPlace&) = delete;
-  StudyPlace& operator=(const StudyPlace&) = delete;
-  std::string at(const std::string& file) const { return folder_ + "/" + file; }
+  StudyPlace() { write_file(at("scene.json"), test::drag_scene(2, 2)); }
+  std::string at(const std::string& file) const { return folder_ / file; }
   bool has(const std::string& file) const { return std::filesystem::exists(at(file)); }
   std::string text(const std::string& file) const { return read_file(at(file)); }
   /// "sweep", FILE, -o FOLDER/out, a coarse mesh and these arguments.
@@ -56,7 +49,7 @@ class StudyPlace {
   }
 
  private:
-  std::string folder_;
+  test::TemporaryFolder folder_;
 };
 
 }  // namespace rhytid::tools

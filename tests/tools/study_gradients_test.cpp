@@ -87,7 +87,7 @@ TEST(Deviations, AreReadInTheUnitOfTheirCoordinate) {
 
 // Sources whose names make the same file name, seen along a direction and not.
 TEST(Sensitivity, ResponsesHaveFilesOfTheirOwnAndDoNotDependOnTheView) {
-  const StudyPlace place("sensitivity_names");
+  const StudyPlace place;
   const std::vector<std::string> arguments = {
       "--set",       "/ligaments/sources/0/name=a b",      "--set",       "/ligaments/sources/1/name=a_b",
       "--parameter", "/ligaments/sources/0/strength",      "--parameter", "/ligaments/sources/1/strength",
@@ -118,7 +118,7 @@ TEST(Sensitivity, ResponsesHaveFilesOfTheirOwnAndDoNotDependOnTheView) {
 }
 
 TEST(Sensitivity, OfASceneThroughTheVerb) {
-  const StudyPlace place("sensitivity");
+  const StudyPlace place;
   const StudyCall call = place.call("sensitivity", "scene.json");
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_THAT(call.out, HasSubstr("All stiffnesses together"));
@@ -147,7 +147,7 @@ TEST(Sensitivity, OfASceneThroughTheVerb) {
     by_log_b += row[4] * row[6];
   }
   const auto figure_at = [&](double factor) {
-    const StudyPlace other("sensitivity_other");
+    const StudyPlace other;
     const std::string left = std::to_string(0.5 * factor), right = std::to_string(3 * factor);
     const StudyCall run = other.call(
         "sensitivity", "scene.json",
@@ -174,7 +174,7 @@ std::map<std::string, std::pair<double, std::vector<double>>> last_frame(const S
 TEST(Sensitivity, OfForcesEnergyAndWrinkles) {
   const std::string film = "/skin/layers/film/youngs_modulus", knot = "/colliders/finger/path/2/position/0";
   const auto study = [&](double factor, double shift) {
-    const StudyPlace place("sensitivity_figures");
+    const StudyPlace place;
     write_file(place.at("experiment.json"), R"({"name": "figures", "scene": "scene.json",
       "measure": {"wavelengths": ["1 mm", "12 mm"], "line": {"from": [-7, 0, 0], "to": [7, 0, 0]},
                   "window": {"centre": [0, 0, 0], "size": [14, 10]}},
@@ -206,7 +206,7 @@ TEST(Sensitivity, OfForcesEnergyAndWrinkles) {
 }
 
 TEST(Sensitivity, RefusesInOneLine) {
-  const StudyPlace place("sensitivity_refused");
+  const StudyPlace place;
   const auto error_of = [&](const std::vector<std::string>& more) {
     const StudyCall call = place.call("sensitivity", "scene.json", more);
     EXPECT_EQ(call.code, 2) << call.err;
@@ -229,7 +229,7 @@ TEST(Sensitivity, RefusesInOneLine) {
 }
 
 TEST(Sensitivity, HoldsOnlyWhatHasAnEffect) {
-  const StudyPlace place("sensitivity_held");
+  const StudyPlace place;
   std::vector<std::string> arguments = {"--hold", "/base/stiffness"};
   for (const char* knot : {"0", "1", "2"})  // the finger never touches
     arguments.insert(arguments.end(),
@@ -250,7 +250,7 @@ const std::vector<std::string> kUnknowns = {"--parameter", "/ligaments/sources/l
                                             "/ligaments/sources/right/strength"};
 
 TEST(PlanStudy, RanksSwipesAndKeepsThem) {
-  const StudyPlace place("plan");
+  const StudyPlace place;
   write_file(place.at("swipes.json"), swipes());
   const StudyCall call = place.call("plan", "swipes.json", kUnknowns);
   ASSERT_EQ(call.code, 0) << call.err;
@@ -287,7 +287,7 @@ TEST(PlanStudy, RanksSwipesAndKeepsThem) {
 }
 
 TEST(PlanStudy, OfPlacesHasLengths) {
-  const StudyPlace place("plan_places");
+  const StudyPlace place;
   write_file(place.at("swipes.json"), swipes());
   const StudyCall call = place.call("plan", "swipes.json",
                                     {"--parameter", "/ligaments/sources/left/position/0", "--parameter",
@@ -298,7 +298,7 @@ TEST(PlanStudy, OfPlacesHasLengths) {
 }
 
 TEST(PlanStudy, RefusesInOneLine) {
-  const StudyPlace place("plan_refused");
+  const StudyPlace place;
   const auto error_of = [&](const std::string& experiment, const std::vector<std::string>& more) {
     write_file(place.at("swipes.json"), experiment);
     const StudyCall call = place.call("plan", "swipes.json", more);

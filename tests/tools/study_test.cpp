@@ -14,6 +14,7 @@
 #include "tests/support/paths.h"
 #include "tests/support/real_data.h"
 #include "tests/support/small_scenes.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/bench/pareto_variant.h"
 #include "tools/interrupt.h"
 #include "tools/study/sweep.h"
@@ -128,14 +129,7 @@ std::vector<std::string> column(const std::string& csv, const std::string& name)
 
 class StudyFolder : public testing::Test {
  protected:
-  StudyFolder() {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = (fs::temp_directory_path() / (std::string("rhytid_study_") + info->name())).string();
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    write_file(folder_ + "/scene.json", test::drag_scene(2, 2));
-  }
-  ~StudyFolder() override { fs::remove_all(folder_); }
+  StudyFolder() { write_file(folder_ + "/scene.json", test::drag_scene(2, 2)); }
 
   std::string experiment(
       const std::string& variants,
@@ -185,7 +179,8 @@ class StudyFolder : public testing::Test {
   std::string out(const std::string& file) const { return folder_ + "/out/" + file; }
   std::string results() const { return read_file(out("results.csv")); }
 
-  std::string folder_;
+  const test::TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
   std::string stop_at_;  ///< Ctrl-C comes when the sweep says this
 };
 

@@ -18,7 +18,7 @@ std::vector<std::string> quiet(const std::vector<std::string>& more) {
 }
 
 TEST(SweptGrid, OfASceneRunsInShardsAndKeepsWhatIsFinished) {
-  const StudyPlace place("swept_grid");
+  const StudyPlace place;
   const std::vector<std::string> grid = quiet(
       {"--grid", "/skin/layers/soft/youngs_modulus=20 kPa,40 kPa", "--grid", "/ligaments/stiffness=0.0005"});
   auto part = grid;
@@ -41,7 +41,7 @@ TEST(SweptGrid, OfASceneRunsInShardsAndKeepsWhatIsFinished) {
 }
 
 TEST(SweptGrid, OfATableTakesItsNames) {
-  const StudyPlace place("swept_table");
+  const StudyPlace place;
   write_file(place.at("table.csv"), "name,/skin/layers/soft/youngs_modulus\nsoft,20 kPa\n");
   const StudyCall call = place.call("sweep", "scene.json", quiet({"--csv", place.at("table.csv")}));
   ASSERT_EQ(call.code, 0) << call.err;
@@ -49,7 +49,7 @@ TEST(SweptGrid, OfATableTakesItsNames) {
 }
 
 TEST(SweptGrid, RefusesInOneLine) {
-  const StudyPlace place("swept_refused");
+  const StudyPlace place;
   write_file(place.at("table.csv"), "/skin/ordr\n2\n");
   const auto error_of = [&](const std::vector<std::string>& more) {
     const StudyCall call = place.call("sweep", "scene.json", more);
@@ -69,7 +69,7 @@ TEST(SweptGrid, RefusesInOneLine) {
 }
 
 TEST(SweptGrid, AndPlanDoNotShareAFolder) {
-  const StudyPlace place("swept_planned");
+  const StudyPlace place;
   const std::string file = place.at("press/experiment.json");
   std::filesystem::create_directories(place.at("press"));
   write_file(file, R"({"scene": "../scene.json", "settings": ["/skin/surface/grid/cells=[4,3]",

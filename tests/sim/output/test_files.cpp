@@ -20,7 +20,7 @@
 #include "sim/output/atomic_file.h"
 #include "sim/output/csv.h"
 #include "sim/output/text.h"
-#include "tests/sim/output/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid {
 namespace {

@@ -12,7 +12,7 @@
 #include "sim/output/colour_map.h"
 #include "sim/output/font.h"
 #include "sim/output/image.h"
-#include "tests/sim/output/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid {
 namespace {

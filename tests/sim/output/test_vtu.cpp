@@ -13,8 +13,8 @@
 #include "sim/output/surface_tessellation.h"
 #include "sim/output/vtu.h"
 #include "tests/sim/output/sample_mesh.h"
-#include "tests/sim/output/temporary_folder.h"
 #include "tests/support/paths.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid {
 namespace {

@@ -10,7 +10,7 @@
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
-#include "tests/sim/output/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid {
 namespace {

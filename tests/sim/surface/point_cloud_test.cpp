@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "sim/core/error.h"
-#include "tests/sim/output/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid {
 namespace {
