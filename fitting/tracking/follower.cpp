@@ -41,16 +41,18 @@ Refusal judge(const Alignment& a, const Vec2& guess, double max_correction, cons
   return Refusal::none;
 }
 
-/// Aligns with the chosen model. The deformation is held as it was, and only the position sought, when
+/// Aligns with the chosen model. The deformation is held at `held`, and only the position sought, when
 /// texture does not fix it: when the affine alignment is refused, or makes the position much less certain
 /// (twice the variance) without explaining the picture better (10 % of the residual).
-Refusal try_align(const PatchTemplate& patch, const PatchWarp& start, double max_correction,
-                  const FrameView& view, const TrackerOptions& o, double min_correlation, Alignment* result) {
+Refusal try_align(const PatchTemplate& patch, const PatchWarp& start, const Eigen::Matrix2d& held_at,
+                  double max_correction, const FrameView& view, const TrackerOptions& o,
+                  double min_correlation, Alignment* result) {
   constexpr double kCostly = 2, kBetter = 1.1;
   const auto attempt = [&](WarpModel model, Alignment* a) {
     AlignmentOptions options;
     options.model = model;
-    *a = align(patch, *view.image, start, options);
+    const bool is_held = model == WarpModel::translation && o.model == WarpModel::affine;
+    *a = align(patch, *view.image, is_held ? PatchWarp{start.centre, held_at} : start, options);
     return judge(*a, start.centre, max_correction, view, o, min_correlation);
   };
   if (o.model == WarpModel::translation) return attempt(WarpModel::translation, result);
@@ -77,8 +79,17 @@ double covered_fraction(const cv::Mat& mask, const Vec2& pixel, int half) {
   return inside.empty() ? 0 : static_cast<double>(cv::countNonZero(mask(inside))) / window.area();
 }
 
-Measurement measure(const Follower& f, const FlowGuess& guess, const FrameView& view,
-                    const TrackerOptions& o) {
+Eigen::Matrix2d held_gradient(const std::vector<Follower>& followers, const Follower& f) {
+  // Neighbours across a fold or an outline say nothing about the window: beyond this they are not believed.
+  constexpr double kCredible = 0.2;
+  const std::optional<PatchWarp> expected = expected_from_neighbours(followers, f.seed);
+  if (!expected) return f.warp.gradient;
+  const Eigen::Matrix2d gradient = expected->gradient * f.template_gradient.inverse();
+  return (gradient - f.warp.gradient).norm() < kCredible ? gradient : f.warp.gradient;
+}
+
+Measurement measure(const Follower& f, const FlowGuess& guess, const Eigen::Matrix2d& held,
+                    const FrameView& view, const TrackerOptions& o) {
   Measurement m;
   m.forward_backward_px = guess.forward_backward_px;
   const int half = o.window_px / 2;
@@ -95,7 +106,7 @@ Measurement measure(const Follower& f, const FlowGuess& guess, const FrameView& 
     m.refusal = Refusal::forward_backward;
   if (m.refusal != Refusal::none) return m;
 
-  m.refusal = try_align(f.patch, {guess.pixel, f.warp.gradient}, o.max_correction_px, view, o,
+  m.refusal = try_align(f.patch, {guess.pixel, f.warp.gradient}, held, o.max_correction_px, view, o,
                         o.min_correlation, &m.alignment);
   return m;
 }
@@ -114,7 +125,9 @@ void measure_from_previous(const Follower& f, const FlowGuess& guess, double typ
   if (patch.values.empty()) return;
   Alignment a;
   const PatchWarp start{guess.pixel, Eigen::Matrix2d::Identity()};
-  if (try_align(patch, start, o.max_correction_px, view, o, o.min_correlation, &a) != Refusal::none) return;
+  if (try_align(patch, start, start.gradient, o.max_correction_px, view, o, o.min_correlation, &a) !=
+      Refusal::none)
+    return;
   if (residual_jumped(f, a, typical, view, o)) return;
   first->alignment = std::move(a);
   first->refusal = Refusal::none;
@@ -147,7 +160,7 @@ Measurement search(const Follower& f, const PatchWarp& expected, const FrameView
   m.refusal = Refusal::occluded;
   if (covered_fraction(*view.mask, start, half) > o.max_covered_fraction) return m;
   // Whole pixels were searched, so the alignment may move by one on top of what the flow would be allowed.
-  m.refusal = try_align(f.patch, {start, gradient}, 1 + o.max_correction_px, view, o,
+  m.refusal = try_align(f.patch, {start, gradient}, gradient, 1 + o.max_correction_px, view, o,
                         o.redetect_min_correlation, &m.alignment);
   if (m.refusal == Refusal::none && residual_jumped(f, m.alignment, f.baseline, view, o))
     m.refusal = Refusal::residual;

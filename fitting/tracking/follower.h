@@ -48,9 +48,14 @@ struct Measurement {
 };
 
 /// First attempt: aligns the follower's template near the guess, with the full warp model and, when that is
-/// not acceptable, with the deformation held as it was. Does not change the follower, as the following two.
-Measurement measure(const Follower& follower, const FlowGuess& guess, const FrameView& view,
-                    const TrackerOptions& options);
+/// not acceptable, with the deformation held at `held` (since the template was cut). Does not change the follower, as
+/// the following two.
+Measurement measure(const Follower& follower, const FlowGuess& guess, const Eigen::Matrix2d& held,
+                    const FrameView& view, const TrackerOptions& options);
+
+/// The deformation since its template was cut that the follower's neighbours tell by how they moved, for windows whose
+/// texture does not; its own last one where neighbours are few or contradict it.
+Eigen::Matrix2d held_gradient(const std::vector<Follower>& followers, const Follower& follower);
 
 /// Did the residual grow by more than max_residual_jump over both the track's last one and `typical`, the
 /// median of this frame? (When the whole picture gets worse, as at a video key frame, all grow, and none is

@@ -1,18 +1,23 @@
 // Sub-pixel alignment of a small template in an image, with the uncertainty of the result.
 //
-//   minimise over p = (c, A, g, b)   Σ_i r_i²,   r_i = I(c + A ξ_i) − (g T_i + b)
+//   minimise over p = (c, A, g, b, s)   Σ_i r_i²,   r_i = I(c + A ξ_i) − (g T_i + b + s·ξ_i)
 //
 // ξ_i are the integer offsets of a (2h+1)² window, T_i the template there, c the position sought, A the local
 // deformation gradient since the template was taken (identity-fixed for WarpModel::translation), g and b gain
-// and bias of the lighting. Gauss-Newton with step halving on the cubic-spline image, all in double
+// and bias of the lighting, s its slope across the window. The slope is 0 unless it takes a third of Σ r² or more
+// and stays below a tenth of b at the rim: in a window of little texture it would take what tells the position,
+// and it must not explain a finger. Gauss-Newton with step halving on the cubic-spline image, all in double
 // precision.
 //
 // Covariance: G = the two rows of (JᵀJ)⁻¹Jᵀ that belong to c, so the error of c is G times the error of r,
 // and
 //   Cov(c) = σ² Σ_d ρ(d) Σ_i G_i G_{i+d}ᵀ,   σ² = Σ r² / (N − parameters)
-// which for white noise (ρ(0) = 1, else 0) is σ² (JᵀJ)⁻¹. ρ is the autocorrelation of the residuals, pooled
+// which for white noise (ρ(0) = 1, else 0) is σ² (JᵀJ)⁻¹. ρ is the autocorrelation of the noise, from residuals pooled
 // over all windows of a frame: compression and interpolation make neighbouring residuals alike, and the white
-// formula is then too optimistic.
+// formula is then too optimistic. Residuals are what the fit leaves of the noise: with H = J (JᵀJ)⁻¹ Jᵀ their
+// covariance is (I − H) σ² R (I − H), R the matrix of ρ. Correlated noise looks like warps and light, so that the
+// fit takes 5 to 20 % of it, and most of what it takes is what moves c. So σ² and ρ are those that give the
+// residuals' autocovariance, by two passes of c(d) + σ² ⟨R − (I − H) R (I − H)⟩_d over up to twelve windows.
 //
 // Source  Baker and Matthews, "Lucas-Kanade 20 years on", IJCV 56 (2004) 221-255 (forward additive form); the
 //         covariance is linear error propagation.
@@ -69,6 +74,7 @@ struct Alignment {
   Eigen::Matrix2Xd influence;    ///< G, shape [2][N], px per grey value
   /// How much the free deformation costs: largest ratio of position variance to that with A held fixed, >= 1.
   double deformation_cost = 1;
+  Eigen::MatrixXf jacobian;         ///< J, shape [parameters][N], grey per unit of the solver's unknowns
   Eigen::Matrix2d unit_covariance;  ///< G Gᵀ: covariance for white noise of unit variance
 };
 
@@ -90,9 +96,17 @@ class ResidualCorrelation {
 
   /// ρ at lag (dx, dy), 0 <= dy <= reach, |dx| <= reach.
   double at(int dx, int dy) const { return rho_[dy][dx + kReach]; }
+  /// Variance of the noise over that of the residuals, σ²: above 1, since correlated noise that the fitted warp
+  /// and light follow is not in the residuals.
+  double variance_ratio() const { return variance_; }
 
  private:
-  std::array<std::array<double, 2 * kReach + 1>, kReach + 1> rho_{};
+  using Lags = std::array<std::array<double, 2 * kReach + 1>, kReach + 1>;  ///< [dy][dx + reach]
+  void take(const Lags& covariance);
+  Lags taken_by_fit(const std::vector<const Alignment*>& alignments) const;
+
+  Lags rho_{};
+  double variance_ = 1;
 };
 
 }  // namespace rhytid::fitting

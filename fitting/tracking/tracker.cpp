@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "fitting/tracking/follower.h"
+#include "fitting/tracking/jitter.h"
 #include "fitting/tracking/optical_flow.h"
 #include "sim/core/error.h"
 
@@ -124,7 +125,8 @@ class Run {
     cv::parallel_for_(cv::Range(0, static_cast<int>(followers_.size())), [&](const cv::Range& range) {
       for (int i = range.start; i < range.end; ++i) {
         if (guess_of[i] >= 0)
-          measured[i] = measure(followers_[i], guesses[guess_of[i]], view, o_);
+          measured[i] = measure(followers_[i], guesses[guess_of[i]], held_gradient(followers_, followers_[i]),
+                                view, o_);
         else
           measured[i].refusal = Refusal::flow;  // was lost before; the search below may find it
       }
@@ -311,16 +313,18 @@ class Run {
       // A point that was never seen again has no residuals of its own and is given typical ones.
       if (!f.common) f.common = 0.5 * correlation_.covariance(*f.with_itself, typical);
       list[0].covariance = *f.common;
-      const std::vector<Eigen::Matrix2d> shared = f.track.shared_covariances();
-      bool unbroken = true;
-      for (const Observation& o : list) {
-        unbroken = unbroken && o.status == TrackStatus::ok;
-        if (&o != list.data() && o.status == TrackStatus::ok)
-          sigmas.push_back(std::sqrt((shared[&o - list.data()] + o.covariance).trace() / 2));
-      }
       report_.kept += f.active;
-      report_.unbroken += unbroken;
+      report_.unbroken += std::all_of(list.begin(), list.end(),
+                                      [](const Observation& o) { return o.status == TrackStatus::ok; });
       result.tracks.tracks.push_back(std::move(f.track));
+    }
+    report_.jitter_px = measure_jitter(result.tracks);
+    add_jitter(report_.jitter_px, &result.tracks);
+    for (const Track& t : result.tracks.tracks) {
+      const std::vector<Eigen::Matrix2d> shared = t.shared_covariances();
+      for (std::size_t i = 1; i < t.observations.size(); ++i)
+        if (t.observations[i].status == TrackStatus::ok)
+          sigmas.push_back(std::sqrt((shared[i] + t.observations[i].covariance).trace() / 2));
     }
     for (const FrameCounts& c : report_.frames) {
       report_.template_updates += c.template_updates;

@@ -105,6 +105,7 @@ struct TrackerReport {
   double forward_backward_median_px = 0;
   double forward_backward_95_px = 0;
   double noise_grey = 0;       ///< per smoothed image: median residual / √2
+  double jitter_px = 0;        ///< what tracks jump beside their neighbours (jitter.h); in the covariances
   double sigma_median_px = 0;  ///< of displacements since the first frame: median of sqrt(trace/2)
   std::array<int, kNumRefusals> refusals{};  ///< times a track was refused, by Refusal
   std::vector<FrameCounts> frames;

@@ -61,11 +61,11 @@ std::string summary(const TrackerReport& r) {
   char text[400];
   std::snprintf(text, sizeof text,
                 "%d of %d frames (%s); %d tracks started, %d kept to the end, %d in every frame\n"
-                "flow there and back per frame: median %.3f px, 95 %% %.3f px; noise %.2f grey; sigma %.3f "
-                "px; %d template updates",
+                "flow there and back per frame: median %.3f px, 95 %% %.3f px; noise %.2f grey; jitter %.3f "
+                "px; sigma %.3f px; %d template updates",
                 r.frames_processed, r.frames_asked, to_string(r.end), r.started, r.kept, r.unbroken,
-                r.forward_backward_median_px, r.forward_backward_95_px, r.noise_grey, r.sigma_median_px,
-                r.template_updates);
+                r.forward_backward_median_px, r.forward_backward_95_px, r.noise_grey, r.jitter_px,
+                r.sigma_median_px, r.template_updates);
   return text;
 }
 
