@@ -16,7 +16,7 @@ namespace rhytid::tools {
 namespace {
 
 constexpr int kParts = 8;               ///< pictures of a frame interval, kSubframes of filming.h
-constexpr double kFingerMargin_px = 4;  ///< as `rhytid track` has it
+constexpr double finger_margin_px = 4;  ///< as `rhytid track` has it
 
 /// The run with kParts frames for each of its own: in between a cubic through the four frames about it (Catmull and
 /// Rom), since a speed that jumps at a frame would make the mean over an exposure differ from its middle.
@@ -81,7 +81,7 @@ class TwinSkin : public FilmedSkin {
     const Vec3 direction = finger_direction(surface_.mean_normal(), camera_);
     o->mask = [this, direction, head](const fitting::Frame& frame) {
       const cv::Mat still = finger_mask(scene_, surface_.times[static_cast<size_t>(frame.index) * kParts],
-                                        direction, camera_, kFingerMargin_px);
+                                        direction, camera_, finger_margin_px);
       cv::Mat moved(still.size(), CV_8U);
       for (int y = 0; y < moved.rows; ++y)
         for (int x = 0; x < moved.cols; ++x) {

@@ -70,7 +70,7 @@ TEST(Tracker, FollowsAnAffineMotionAndKnowsItsErrors) {
   const Errors e = errors_of(r.tracks, truth);
   EXPECT_LT(e.rms, 0.02);
   EXPECT_GT(e.normalised, 0.8);
-  EXPECT_LT(e.normalised, 1.4);
+  EXPECT_LT(e.normalised, 1.2);  // 1.28 when what the fit takes of correlated noise was not allowed for
 }
 
 TEST(Tracker, WithoutNoiseOnlyRoundingIsLeft) {
@@ -95,6 +95,28 @@ TEST(Tracker, LightingGainAndBiasDoNotMoveTracks) {
   const Errors e = errors_of(r.tracks, truth);
   EXPECT_LT(e.rms, 0.02);
   EXPECT_LT(e.normalised, 1.35);
+}
+
+// Texture in stripes of 12 px: a window with some of it at one side does not tell its deformation, and held at that of the
+// first frame it would move. Its neighbours tell it.
+TEST(Tracker, OneSidedTextureIsDeformedAsItsNeighboursMove) {
+  const Speckle skin(kWidth, kHeight, 11);
+  FootageFolder folder;
+  for (int f = 0; f < 10; ++f) {
+    const AffineMotion m = motion(2 * f);
+    cv::Mat both = picture(skin, m, 1.5, 700 + f, 0.01, 121);
+    const cv::Mat strong = picture(skin, m, 1.5, 800 + f, 0.25, 90);
+    for (int y = 0; y < both.rows; ++y)
+      for (int x = 0; x < both.cols; ++x)
+        if (std::fmod(m.backward(Vec2(x, y)).x() + 480, 48) < 12)
+          both.at<uchar>(y, x) = strong.at<uchar>(y, x);
+    folder.add(both);
+  }
+  FrameSource source = folder.source();
+  const TrackerResult r = track(source, small_grid());
+  const Errors e = errors_of(r.tracks, [](int f, const Vec2& X) { return truth(2 * f, X); });
+  EXPECT_GT(e.count, 200);
+  EXPECT_LT(e.normalised, 3.2);  // 2.6; held: 3.9. Windows that see hardly any texture keep it above 1
 }
 
 // Stretch by 1.4 with a local bulge that no affine window follows: templates must be renewed. The error is
