@@ -69,7 +69,10 @@ inline bool any_of(LaneMask condition) {
 /// The same number in every lane.
 template <class V>
 V broadcast(double value) {
-  return V{} + value;
+  if constexpr (std::is_same_v<V, Lanes>)
+    return value - V{};  // unlike + V{}, which changes −0, no operation
+  else
+    return V{} + value;
 }
 
 inline double lane_sqrt(double a) {

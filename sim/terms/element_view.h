@@ -24,16 +24,21 @@ struct ProductView {
   const double* plane_by_node =
       nullptr;                ///< `plane` the other way round: [node][∂/∂u, ∂/∂v, value by t], padded
   int padded_plane_rows = 0;  ///< length of a row of it, a multiple of 8
+
+  static constexpr int kMaxLineNodes = 5;  ///< at most
+  static constexpr int kPlaneSlots = 32;   ///< plane points that one Hessian pass treats
+  /// Pairs of (line node, component), each once, padded to a multiple of 8.
+  int pairs() const { return (3 * line_nodes * (3 * line_nodes + 1) / 2 + 7) / 8 * 8; }
 };
 
 /// Doubles that the sum of an element's Hessian needs (HessianBlocks, ProductHessian).
 inline std::size_t hessian_work_size(int padded_nodes, const ProductView& p) {
-  constexpr std::size_t pad = 16;
-  const std::size_t n8 = static_cast<std::size_t>(padded_nodes), rows = kHessianRows;
-  const std::size_t m = 3 * static_cast<std::size_t>(p.line_nodes),
-                    np = static_cast<std::size_t>(p.plane_nodes), n = m * np;
-  return std::max(6 * n8 * n8 + 7 * rows * n8,
-                  n * (n + pad) + rows * (n + 2 * pad) + m * rows * 3 * (m + pad) + pad);
+  const std::size_t n8 = static_cast<std::size_t>(padded_nodes), rows = kHessianRows,
+                    np = static_cast<std::size_t>(p.plane_nodes), pairs = static_cast<std::size_t>(p.pairs()),
+                    slots = ProductView::kPlaneSlots;
+  // The matrix, left factors of a tile, factors of the plane points; what these may write too far; a cache line.
+  const std::size_t product = np * np * pairs + 3 * slots * 5 * 8 + 9 * slots * pairs + 8 + 8;
+  return std::max(6 * n8 * n8 + 7 * rows * n8, product);
 }
 
 /// Everything an element kernel reads, as plain pointers (null where a law has none).

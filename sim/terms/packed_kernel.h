@@ -119,16 +119,8 @@ struct PackedKernel {
         }
       const int count = v.num_points - first < kLanes ? v.num_points - first : kLanes;
       if (projected) project(a, count);
-      // The Jacobian and the weight on both sides: natural directions.
-      Lanes half[nz][nz], folded[nz][nz];
-      for (int i = 0; i < nz; ++i) Kin::from_point(a[i], p.jacobian, p.weight, half[i]);
-      for (int j = 0; j < nz; ++j) {
-        Lanes column[nz], mapped[nz];
-        for (int i = 0; i < nz; ++i) column[i] = half[i][j];
-        Kin::from_point(column, p.jacobian, broadcast<Lanes>(1), mapped);
-        for (int i = 0; i < nz; ++i) folded[i][j] = mapped[i];
-      }
-      blocks.add_pack(first, count, folded);
+      natural_blocks(a, p.jacobian, p.weight, blocks.pack(first));
+      blocks.add_pack(first, count);
     }
     return blocks.finish(dense);
   }
@@ -139,7 +131,7 @@ struct PackedKernel {
     for (int i = 0; i < count; i += 8) __builtin_prefetch(from + i);
   }
 
-  /// a_(aI)(bJ) = Σ_KL F_aK D_(IK)(JL) F_bL, D the tangent by full index pairs: twice along a diagonal pair.
+  /// a_(aI)(bJ) = Σ_KL F_aK D_(IK)(JL) F_bL for a ≤ b, D the tangent by full index pairs: twice along a diagonal pair.
   [[gnu::noinline]] static void material_block(const Lanes* h, const Lanes (*tangent)[ne], Lanes (*a)[nz]) {
     Lanes f[3][3], db[ne][nz];
     for (int i = 0; i < 3; ++i)
@@ -156,7 +148,7 @@ struct PackedKernel {
         }
     for (int m = 0; m < 3; ++m)
       for (int i = 0; i < 3; ++i)
-        for (int z = 0; z < nz; ++z) {
+        for (int z = 3 * m; z < nz; ++z) {
           Lanes sum = {};
           for (int k = 0; k < 3; ++k) {
             const Lanes d = db[kSym[i][k]][z];
@@ -166,11 +158,33 @@ struct PackedKernel {
         }
   }
 
+  /// The Jacobian on both sides and the weight: blocks a ≤ b in natural directions, as BlockEntries.
+  [[gnu::noinline]] static void natural_blocks(const Lanes (*a)[nz], const Lanes* jacobian,
+                                               const Lanes& weight, Lanes* to) {
+    Lanes weighted[9];
+    for (int k = 0; k < 9; ++k) weighted[k] = weight * jacobian[k];
+    for (int ca = 0; ca < 3; ++ca)
+      for (int cb = ca; cb < 3; ++cb)
+        for (int s = 0; s < 3; ++s) {
+          Lanes column[3];
+          for (int i = 0; i < 3; ++i) {
+            const Lanes* const row = a[3 * ca + i] + 3 * cb;
+            column[i] =
+                row[0] * weighted[3 * s] + row[1] * weighted[3 * s + 1] + row[2] * weighted[3 * s + 2];
+          }
+          for (int r = 0; r < 3; ++r)
+            to[BlockEntries::of(ca, cb, r, s)] = column[0] * jacobian[3 * r] +
+                                                 column[1] * jacobian[3 * r + 1] +
+                                                 column[2] * jacobian[3 * r + 2];
+        }
+  }
+
+  /// Of a only the blocks a ≤ b are there.
   static void project(Lanes (*a)[nz], int count) {
     for (int k = 0; k < count; ++k) {
       double one[nz][nz];
       for (int i = 0; i < nz; ++i)
-        for (int j = 0; j < nz; ++j) one[i][j] = a[i][j][k];
+        for (int j = 0; j < nz; ++j) one[i][j] = i / 3 <= j / 3 ? a[i][j][k] : a[j][i][k];
       project_psd<nz>(one);
       for (int i = 0; i < nz; ++i)
         for (int j = 0; j < nz; ++j) a[i][j][k] = one[i][j];

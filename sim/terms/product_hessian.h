@@ -2,7 +2,10 @@
 // summed one direction at a time: three times fewer operations than point by point over all nodes.
 //
 //   N_(jc) = P_j(u,v) T_c(w), points (t, z)       rows of the table: G_r,j(t) g_r,c(z), G = P,u P,v P; g = T T T'
-//   K_(jca)(ldb) = Σ_t Σ_rs G_r,j G_s,l B_(rca)(sdb)(t)        B = Σ_z g_r,c g_s,d A_(ar)(bs)(t, z)
+//   K_(jca)(ldb) = Σ_t Σ_r G_r,j Σ_s G_s,l B_rs(t)[(ca)(db)],     B = Σ_z g_r,c g_s,d A_(ar)(bs)(t, z)
+//
+// The pairs (ca)(db) lie in the lanes: sums over the plane multiply packs of them by single numbers of G. Half of them are
+// summed, the others being the same with j and l exchanged.
 //
 // Tests    tests/sim/terms/term_kernels_test.cpp (against the sum point by point)
 #pragma once
@@ -16,72 +19,56 @@
 namespace rhytid {
 inline namespace RHYTID_ISA {
 
-/// How the 54 entries of a point's upper component blocks lie beside each other: by what happens to them through the
-/// thickness (derivatives there on neither side, on the right, on the left, on both), each kind filled up to vectors of 8.
+/// How the 54 entries of a point's upper component blocks lie beside each other.
 struct BlockEntries {
-  static constexpr int size = 64, begin[5] = {0, 24, 40, 56, 64};
-  /// Of block (ca ≤ cb), directions r and s.
-  static constexpr int of(int ca, int cb, int r, int s) {
-    const int block = ca == 0 ? cb : ca + cb + 1;  // 00 01 02 11 12 22
-    if (r < 2) return s < 2 ? 4 * block + 2 * r + s : begin[1] + 2 * block + r;
-    return s < 2 ? begin[2] + 2 * block + s : begin[3] + block;
-  }
+  static constexpr int size = 54;
+  /// Of block (ca ≤ cb).
+  static constexpr int block(int ca, int cb) { return ca == 0 ? cb : ca + cb + 1; }  // 00 01 02 11 12 22
+  /// Directions r and s of it.
+  static constexpr int of(int ca, int cb, int r, int s) { return 9 * block(ca, cb) + 3 * r + s; }
 };
 
-/// BlockEntries::of by [ca][cb][r][s].
-inline constexpr auto kEntry = [] {
-  struct {
-    int of[3][3][3][3];
-    constexpr auto& operator[](int k) const { return of[k]; }
-  } table{};
+/// Calls f(ca, cb, r, s) for all entries.
+template <class F>
+[[gnu::always_inline]] inline void for_block_entries(F&& f) {
   for (int ca = 0; ca < 3; ++ca)
     for (int cb = ca; cb < 3; ++cb)
       for (int r = 0; r < 3; ++r)
-        for (int s = 0; s < 3; ++s) table.of[ca][cb][r][s] = BlockEntries::of(ca, cb, r, s);
-  return table;
-}();
+        for (int s = 0; s < 3; ++s) f(ca, cb, r, s);
+}
 
 /// Σ_q Gᵀ A_q G from point blocks A_q [9][9] in natural directions, weight included; points come in their order.
+/// Pairs come by blocks a ≤ b, within them by c and d; c ≤ d where a = b.
 class ProductHessian {
  public:
   /// `v.product` is there; `work` holds hessian_work_size() doubles.
-  ProductHessian(const ElementView& v, double* work) : v_(v), p_(v.product), m_(3 * p_.line_nodes) {
+  ProductHessian(const ElementView& v, double* work) : v_(v), p_(v.product) {
+    if (p_.line_points == 0) return;
     // From a cache line on, so that vectors lie within lines.
     matrix_ = work + (64 - reinterpret_cast<std::uintptr_t>(work) % 64) % 64 / sizeof(double);
-    std::size_t size = 0;
-    for (int m = 0; m < m_; ++m) size += static_cast<std::size_t>(p_.plane_nodes) * columns(m);
-    left_ = matrix_ + size;
-    b_ = left_ + static_cast<std::size_t>(kRows) * (columns(0) + kPad);
+    pairs_ = p_.pairs();
+    left_ = matrix_ + p_.plane_nodes * p_.plane_nodes * pairs_;
+    b_ = left_ + 3 * kPlaneSlots * kMaxWidth * kLanes;
+    // As many plane points to a pass as give passes of the same size.
+    const int points = v.num_points / p_.line_points, passes = (points + kPlaneSlots - 1) / kPlaneSlots;
+    slots_ = (points + passes - 1) / passes;
+    with_constant<kMaxLineNodes>(p_.line_nodes, [&](auto nl) { line_products<nl>(); });
   }
   /// Point q's block; consecutive entries lie `stride` apart. Points that are left out have none.
   void add(int q, const double* a, int stride) {
-    while (next_ < q) {
-      std::memset(row(next_), 0, sizeof(double) * BlockEntries::size);
-      advance();
-    }
-    double* const to = row(q);
-    for (int ca = 0; ca < 3; ++ca)
-      for (int cb = ca; cb < 3; ++cb)
-        for (int r = 0; r < 3; ++r)
-          for (int s = 0; s < 3; ++s)
-            to[BlockEntries::of(ca, cb, r, s)] = a[((ca * 3 + r) * 9 + cb * 3 + s) * stride];
+    while (next_ < q) skip();
+    double* const to = entries(q);
+    for_block_entries([&](int ca, int cb, int r, int s) {
+      to[BlockEntries::of(ca, cb, r, s) * kLanes] = a[((ca * 3 + r) * 9 + cb * 3 + s) * stride];
+    });
     is_filled_ = true;
     advance();
   }
-  /// The blocks of points first … first + count − 1, one per lane; `first` is a multiple of kLanes.
-  void add_pack(int first, int count, const Lanes (*a)[9]) {
-    for (int begin = 0; begin < BlockEntries::size; begin += kLanes) {
-      Lanes block[kLanes] = {};
-      for (int ca = 0; ca < 3; ++ca)
-        for (int cb = ca; cb < 3; ++cb)
-          for (int r = 0; r < 3; ++r)
-            for (int s = 0; s < 3; ++s) {
-              const int entry = BlockEntries::of(ca, cb, r, s) - begin;
-              if (entry >= 0 && entry < kLanes) block[entry] = a[3 * ca + r][3 * cb + s];
-            }
-      transpose(block);
-      for (int k = 0; k < kLanes; ++k) std::memcpy(row(first + k) + begin, &block[k], sizeof(Lanes));
-    }
+  /// Where the blocks of points first … first + kLanes − 1 go, entry by entry, one per lane; `first` is a multiple of
+  /// kLanes.
+  Lanes* pack(int first) { return kept_[first / kLanes % kKeptPacks]; }
+  /// The next `count` points' blocks are in their pack.
+  void add_pack(int count) {
     for (int k = 0; k < count; ++k) {
       is_filled_ = true;
       advance();
@@ -90,176 +77,212 @@ class ProductHessian {
 
   /// Dense [3n][3n], node-major, full. False, and nothing written, when no point was added.
   bool finish(double* dense) {
-    while (next_ % p_.line_points != 0) {
-      std::memset(row(next_), 0, sizeof(double) * BlockEntries::size);
-      advance();
-    }
+    while (next_ % p_.line_points != 0) skip();
     flush();
     if (!begun_) return false;
-    const int nl = p_.line_nodes, np = p_.plane_nodes, n3 = 3 * v_.num_nodes;
-    const double* rows[3 * kMaxLineNodes];  // of every m, from column e = m on
-    rows[0] = matrix_;
-    for (int m = 1; m < m_; ++m) rows[m] = rows[m - 1] + static_cast<std::size_t>(np) * columns(m - 1);
-    for (int m = 0; m < m_; ++m) {
-      const int a = m / nl, c = m % nl;
-      for (int j = 0; j < np; ++j) {
-        double* const to = dense + static_cast<std::size_t>(3 * (j * nl + c) + a) * n3;
-        for (int e = 0; e < m_; ++e) {
-          double* const column = to + 3 * (e % nl) + e / nl;
-          // What lies below the diagonal is taken from above it.
-          const double* from = e < m ? rows[e] + (m - e) * np + j : rows[m] + j * columns(m) + (e - m) * np;
-          const int step = e < m ? columns(e) : 1;
-          for (int l = 0; l < np; ++l) column[3 * nl * l] = from[l * step];
-        }
-      }
-    }
+    with_constant<kMaxLineNodes>(p_.line_nodes, [&](auto nl) { unpack<nl>(dense); });
     return true;
   }
 
  private:
-  static constexpr int kMaxLineNodes = 5, kTile = 2 * kLanes, kPad = 16, kSlots = kHessianRows / 3,
-                       kRows = kHessianRows;
-  static_assert(kPad >= kTile);
-  /// Points whose entries are kept: those of one plane point and of the packs that these may lie in.
-  static constexpr int kKept = 16;
-  static_assert(kKept >= kMaxLinePoints + kLanes);
+  static constexpr int kMaxLineNodes = ProductView::kMaxLineNodes, kPlaneSlots = ProductView::kPlaneSlots;
+  /// Nodes of the plane in a register tile, at most.
+  static constexpr int kMaxWidth = 5;
+  /// Packs whose entries are kept: those that the points of one plane point may lie in.
+  static constexpr int kKeptPacks = 16 / kLanes;
+  static_assert(16 >= kMaxLinePoints + kLanes);
+  static constexpr int kMaxVectors = (kMaxLineNodes * kMaxLineNodes + kLanes - 1) / kLanes;
 
-  /// Columns of the rows (·, c, a), m = a · line nodes + c: those of m and after, padded.
-  int columns(int m) const { return ((m_ - m) * p_.plane_nodes + kTile - 1) / kTile * kTile; }
-  double* row(int q) { return kept_[q % kKept]; }
-
+  double* entries(int q) { return reinterpret_cast<double*>(kept_[q / kLanes % kKeptPacks]) + q % kLanes; }
+  void skip() {
+    double* const to = entries(next_);
+    for (int k = 0; k < BlockEntries::size; ++k) to[k * kLanes] = 0;
+    advance();
+  }
   /// The next point's entries are there.
   void advance() {
     ++next_;
     if (next_ % p_.line_points != 0) return;
-    if (is_filled_) contract(next_ / p_.line_points - 1);
+    if (is_filled_) {
+      if (filled_ == slots_) flush();
+      with_constant<kMaxLineNodes>(p_.line_nodes, [&](auto nl) {
+        with_constant<kMaxLinePoints>(p_.line_points,
+                                      [&](auto nz) { contract<nl, nz>(next_ / p_.line_points - 1); });
+      });
+      ++filled_;
+    }
     is_filled_ = false;
   }
 
-  /// B of plane point t into a slot, [c][d][entry].
+  /// First pair of block (ca ≤ cb), of `nl` line nodes.
+  static constexpr int first_pair(int nl, int ca, int cb) {
+    const int full = nl * nl, half = nl * (nl + 1) / 2;
+    return ca == 0 ? (cb > 0) * half + (cb > 1) * full
+                   : 2 * full + half + (ca > 1 || cb > 1) * half + (ca > 1) * full;
+  }
+  /// Of a pair of line nodes within it.
+  static constexpr int pair(int nl, bool is_half, int c, int d) {
+    return is_half ? c * nl - c * (c - 1) / 2 + d - c : c * nl + d;
+  }
+
+  /// Products g_r,c g_s,d at the line points, as pairs lie beside each other.
+  template <int nl>
+  void line_products() {
+    for (int half = 0; half < 2; ++half)
+      for (int kind = 0; kind < 4; ++kind)
+        for (int z = 0; z < p_.line_points; ++z) {
+          const double* const values = p_.line + z * 2 * kLineStride;
+          const double *const left = values + (kind / 2) * kLineStride, *const right =
+                                                                            values + (kind % 2) * kLineStride;
+          double* const to = reinterpret_cast<double*>(products_[half][kind][z]);
+          for (int c = 0; c < nl; ++c)
+            for (int d = half ? c : 0; d < nl; ++d) to[pair(nl, half, c, d)] = left[c] * right[d];
+        }
+  }
+
+  /// B of plane point t into a slot, [r][s][pair].
+  template <int nl, int nz>
   void contract(int t) {
-    if (filled_ == kSlots) flush();
-    const int nl = p_.line_nodes, nz = p_.line_points;
     for (int r = 0; r < 3; ++r)
       plane_rows_[3 * filled_ + r] = p_.plane + (static_cast<std::size_t>(t) * 3 + r) * p_.padded_plane_nodes;
-    double* const to = b_ + static_cast<std::size_t>(filled_) * nl * nl * BlockEntries::size;
-    with_constant<kMaxLinePoints>(nz, [&](auto points) {
-      for (int kind = 0; kind < 4; ++kind) {
-        const double *const left = p_.line + (kind >= 2) * kLineStride, *const right =
-                                                                            p_.line +
-                                                                            (kind % 2) * kLineStride;
-        for (int k = BlockEntries::begin[kind]; k < BlockEntries::begin[kind + 1]; k += kLanes) {
-          Lanes a[points];
-          unroll<points>([&](auto z)
-                             __attribute__((always_inline)) { a[z] = load_lanes(row(t * points + z) + k); });
-          for (int c = 0; c < nl; ++c)
-            for (int d = 0; d < nl; ++d) {
-              Lanes sum = {};
-              unroll<points>([&](auto z) __attribute__((always_inline)) {
-                constexpr int at = 2 * kLineStride * z;
-                sum += (left[at + c] * right[at + d]) * a[z];
-              });
-              store_lanes(sum, to + (c * nl + d) * BlockEntries::size + k);
-            }
-        }
+    double* slot = b_ + static_cast<std::size_t>(filled_) * 9 * pairs_;
+    const double* from[nz];
+    for (int z = 0; z < nz; ++z) from[z] = entries(t * nz + z);
+    // In the order of pairs: what a block writes too far, the next one overwrites.
+    for (int r = 0; r < 3; ++r)
+      for (int s = 0; s < 3; ++s, slot += pairs_) {
+        const int kind = 2 * (r == 2) + (s == 2), entry = (3 * r + s) * kLanes;
+        unroll<3>([&](auto ca) __attribute__((always_inline)) {
+          unroll<3 - ca>([&](auto step) __attribute__((always_inline)) {
+            constexpr int cb = ca + step, block = BlockEntries::of(ca, cb, 0, 0);
+            constexpr bool is_half = step == 0;
+            constexpr int count = is_half ? nl * (nl + 1) / 2 : nl * nl,
+                          vectors = (count + kLanes - 1) / kLanes;
+            const Lanes(*const g)[kMaxVectors] = products_[is_half][kind];
+            Lanes sum[vectors] = {};
+            unroll<nz>([&](auto z) __attribute__((always_inline)) {
+              const double a = from[z][block * kLanes + entry];
+              unroll<vectors>([&](auto k) __attribute__((always_inline)) { sum[k] += a * g[z][k]; });
+            });
+            unroll<vectors>([&](auto k) __attribute__((always_inline)) {
+              store_lanes(sum[k], slot + first_pair(nl, ca, cb) + k * kLanes);
+            });
+          });
+        });
       }
-    });
-    ++filled_;
   }
 
   /// Adds the plane points of the slots to the matrix.
   void flush() {
     if (filled_ == 0) return;
-    const int nl = p_.line_nodes, np = p_.plane_nodes;
-    if (!begun_) {
-      std::memset(matrix_, 0, sizeof(double) * static_cast<std::size_t>(left_ - matrix_));
-      begun_ = true;
-    }
-    double* k = matrix_;
-    for (int a = 0; a < 3; ++a)
-      for (int c = 0; c < nl; ++c) {
-        const int n = columns(a * nl + c);
-        with_constant<16 / kLanes>((np + kLanes - 1) / kLanes,
-                                   [&](auto vectors) { make_left<vectors>(a, c, n); });
-        if (np % 5 == 0)
-          multiply<5>(3 * filled_, n, n + kPad, k);
-        else
-          multiply<3>(3 * filled_, n, n + kPad, k);
-        k += static_cast<std::size_t>(np) * n;
-      }
+    const int np = p_.plane_nodes;
+    if (kLanes == 8 && np % 5 == 0)
+      add_slots<5, 5>();
+    else if (np % 3 == 0)
+      add_slots<3, 3>();
+    else
+      add_slots<5, 2>();
+    begun_ = true;
     filled_ = 0;
   }
+  /// In tiles of `height` by `width` nodes by a pack of pairs.
+  template <int height, int width>
+  void add_slots() {
+    for (int pair = 0; pair < pairs_; pair += kLanes)
+      for (int l = 0; l < p_.plane_nodes; l += width) {
+        make_left<width>(l, b_ + pair);
+        for (int j = 0; j < p_.plane_nodes; j += height)
+          multiply<height, width>(j, matrix_ + (j * p_.plane_nodes + l) * pairs_ + pair);
+      }
+  }
 
-  /// left_[row][(e, l)] = Σ_s B_(r m)(s e) G_s,l for m = (a, c), e ≥ m; plane nodes fill `vectors`.
-  template <int vectors>
-  void make_left(int a, int c, int n) {
-    const int nl = p_.line_nodes, np = p_.plane_nodes;
-    for (int slot = 0; slot < filled_; ++slot) {
-      const double* const plane = plane_rows_[3 * slot];
-      Lanes g[3][vectors];
-      for (int s = 0; s < 3; ++s)
-        for (int v = 0; v < vectors; ++v)
-          std::memcpy(&g[s][v], plane + s * p_.padded_plane_nodes + v * kLanes, sizeof(Lanes));
-      const double* const of_c = b_ + (static_cast<std::size_t>(slot) * nl + c) * nl * BlockEntries::size;
-      for (int r = 0; r < 3; ++r) {
-        double* const begin = left_ + static_cast<std::size_t>(3 * slot + r) * (n + kPad);
-        double* to = begin;
-        for (int b = a; b < 3; ++b) {
-          const int* const entry = kEntry[a][b][r];
-          for (int d = b == a ? c : 0; d < nl; ++d, to += np) {
-            const double* const entries = of_c + d * BlockEntries::size;
-            const double b0 = entries[entry[0]], b1 = entries[entry[1]], b2 = entries[entry[2]];
-            for (int v = 0; v < vectors; ++v) {
-              const Lanes sum = b0 * g[0][v] + b1 * g[1][v] + b2 * g[2][v];
-              std::memcpy(to + v * kLanes, &sum, sizeof sum);
-            }
-          }
-        }
-        // The padding columns belong to nobody, but must be numbers.
-        for (const double* const end = begin + n; to < end; ++to) *to = 0;
+  /// left_[row (t, r)][l] = Σ_s B_rs(t) G_s,l(t) for `width` plane nodes and the pairs at b.
+  template <int width>
+  [[gnu::noinline]] void make_left(int l, const double* b) {
+    const int stride = p_.padded_plane_nodes, pairs = pairs_;
+    double* to = left_;
+    for (int slot = 0; slot < filled_; ++slot, b += 9 * pairs, to += 3 * width * kLanes) {
+      const double* const g = plane_rows_[3 * slot] + l;
+      if constexpr (kLanes == 8) {
+        Lanes in[9];
+        unroll<9>([&](auto k) __attribute__((always_inline)) { in[k] = load_lanes(b + k * pairs); });
+        unroll<width>([&](auto i) __attribute__((always_inline)) {
+          const Lanes g0 = broadcast<Lanes>(g[i]), g1 = broadcast<Lanes>(g[stride + i]),
+                      g2 = broadcast<Lanes>(g[2 * stride + i]);
+          unroll<3>([&](auto r) __attribute__((always_inline)) {
+            store_lanes(in[3 * r] * g0 + in[3 * r + 1] * g1 + in[3 * r + 2] * g2,
+                        to + (r * width + i) * kLanes);
+          });
+        });
+      } else {
+        unroll<3>([&](auto r) __attribute__((always_inline)) {
+          const Lanes b0 = load_lanes(b + 3 * r * pairs), b1 = load_lanes(b + (3 * r + 1) * pairs),
+                      b2 = load_lanes(b + (3 * r + 2) * pairs);
+          unroll<width>([&](auto i) __attribute__((always_inline)) {
+            store_lanes(b0 * g[i] + b1 * g[stride + i] + b2 * g[2 * stride + i],
+                        to + (r * width + i) * kLanes);
+          });
+        });
       }
     }
   }
 
-  /// k [plane nodes][n] += Σ_row G[row][j] left[row][·]; plane nodes are a multiple of `height`.
-  template <int height>
-  void multiply(int rows, int n, int left_stride, double* k) const {
-    for (int j = 0; j < p_.plane_nodes; j += height)
-      for (int column = 0; column < n; column += kTile) {
-        Lanes sum[height][2], left[2];
-        double* to[height];
-        for (int i = 0; i < height; ++i) {
-          to[i] = k + static_cast<std::size_t>(j + i) * n + column;
-          load_pair(to[i], sum[i]);
-        }
-        for (int row = 0; row < rows; ++row) {
-          const double* const g = plane_rows_[row] + j;
-          load_pair(left_ + static_cast<std::size_t>(row) * left_stride + column, left);
-          for (int i = 0; i < height; ++i) {
-            sum[i][0] += g[i] * left[0];
-            sum[i][1] += g[i] * left[1];
-          }
-        }
-        for (int i = 0; i < height; ++i) {
-          std::memcpy(to[i], &sum[i][0], sizeof(Lanes));
-          std::memcpy(to[i] + kLanes, &sum[i][1], sizeof(Lanes));
-        }
-      }
+  /// k [height][width] += Σ_row G[row][j …] left[row][…]; k's rows lie a row of nodes apart.
+  template <int height, int width>
+  [[gnu::noinline]] void multiply(int j, double* k) const {
+    Lanes sum[height * width] = {};
+    const int row_stride = p_.plane_nodes * pairs_, pairs = pairs_;
+    if (begun_)
+      unroll<height * width>([&](auto i) __attribute__((always_inline)) {
+        sum[i] = load_lanes(k + i / width * row_stride + i % width * pairs);
+      });
+    const double* left = left_;
+    for (int row = 0; row < 3 * filled_; ++row, left += width * kLanes) {
+      const double* const g = plane_rows_[row] + j;
+      Lanes factor[width];
+      unroll<width>([&](auto l)
+                        __attribute__((always_inline)) { factor[l] = load_lanes(left + l * kLanes); });
+      unroll<height>([&](auto i) __attribute__((always_inline)) {
+        unroll<width>([&](auto l) __attribute__((always_inline)) { sum[i * width + l] += g[i] * factor[l]; });
+      });
+    }
+    unroll<height * width>([&](auto i) __attribute__((always_inline)) {
+      store_lanes(sum[i], k + i / width * row_stride + i % width * pairs);
+    });
   }
-  /// Vector by vector: copied at once, GCC 12 takes half vectors through memory, which stalls.
-  static void load_pair(const double* from, Lanes* to) {
-    std::memcpy(&to[0], from, sizeof(Lanes));
-    std::memcpy(&to[1], from + kLanes, sizeof(Lanes));
+
+  /// From [j][l][pair] to [j][c][a][l][d][b]; the halves that were not summed are taken from (l, j).
+  template <int nl>
+  void unpack(double* dense) const {
+    const int np = p_.plane_nodes, n3 = 3 * nl * np;
+    for (int j = 0; j < np; ++j)
+      for (int l = 0; l < np; ++l) {
+        const double *const own = matrix_ + (j * np + l) * pairs_, *const mirrored =
+                                                                       matrix_ + (l * np + j) * pairs_;
+        double* const corner = dense + static_cast<std::size_t>(3 * nl * j) * n3 + 3 * nl * l;
+        unroll<3 * nl>([&](auto row) __attribute__((always_inline)) {
+          constexpr int c = row / 3, a = row % 3;
+          double* const to = corner + row * n3;
+          unroll<3 * nl>([&](auto column) __attribute__((always_inline)) {
+            constexpr int d = column / 3, b = column % 3;
+            if constexpr (a < b || (a == b && c <= d))
+              to[column] = own[first_pair(nl, a, b) + pair(nl, a == b, c, d)];
+            else
+              to[column] = mirrored[first_pair(nl, b, a) + pair(nl, a == b, d, c)];
+          });
+        });
+      }
   }
 
   const ElementView& v_;
   const ProductView& p_;
-  const int m_;
-  double *matrix_, *left_, *b_;
-  const double* plane_rows_[kRows] = {};    ///< of the slots
-  int next_ = 0, filled_ = 0;               ///< point; slots
-  bool is_filled_ = false, begun_ = false;  ///< the current plane point; the matrix
-  double kept_[kKept][BlockEntries::size];  ///< of the last points
+  int pairs_ = 0, slots_ = 0;
+  double *matrix_ = nullptr, *left_ = nullptr, *b_ = nullptr;
+  const double* plane_rows_[3 * kPlaneSlots] = {};  ///< of the slots
+  int next_ = 0, filled_ = 0;                       ///< point; slots
+  bool is_filled_ = false, begun_ = false;          ///< the current plane point; the matrix
+  Lanes kept_[kKeptPacks][BlockEntries::size];      ///< of the last points
+  Lanes products_[2][4][kMaxLinePoints][kMaxVectors] = {};
 };
 
 /// The element matrix, by whichever sum the element allows; functions as those of the two.
@@ -276,12 +299,18 @@ class ElementHessian<3> {
   void add(int q, const double* a, int stride) {
     is_product_ ? product_.add(q, a, stride) : blocks_.add(q, a, stride);
   }
-  /// Points first … first + count − 1, one per lane.
-  void add_pack(int first, int count, const Lanes (*a)[9]) {
-    if (is_product_) return product_.add_pack(first, count, a);
-    double flat[81 * kLanes];
-    std::memcpy(flat, a, sizeof flat);
-    for (int k = 0; k < count; ++k) blocks_.add(first + k, flat + k, kLanes);
+  /// Where points first … first + kLanes − 1 go, one per lane: BlockEntries.
+  Lanes* pack(int first) { return is_product_ ? product_.pack(first) : pack_; }
+  /// The first `count` of that pack are there.
+  void add_pack(int first, int count) {
+    if (is_product_) return product_.add_pack(count);
+    for (int k = 0; k < count; ++k) {
+      double a[81];
+      for_block_entries([&](int ca, int cb, int r, int s) {
+        a[(ca * 3 + r) * 9 + cb * 3 + s] = pack_[BlockEntries::of(ca, cb, r, s)][k];
+      });
+      blocks_.add(first + k, a, 1);
+    }
   }
   bool finish(double* dense) { return is_product_ ? product_.finish(dense) : blocks_.finish(dense); }
 
@@ -289,6 +318,7 @@ class ElementHessian<3> {
   bool is_product_;
   ProductHessian product_;
   HessianBlocks<3> blocks_;
+  Lanes pack_[BlockEntries::size];
 };
 
 }  // namespace RHYTID_ISA

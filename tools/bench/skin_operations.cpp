@@ -108,7 +108,7 @@ SkinOperations count_skin_operations(const SkinLaw& law, const ElementView& view
                       });
     total.hessian += strain +
                      count([&] { (void)law.response<Counted>(y, history, theta, of_step, sigma, tangent); }) +
-                     18 * count([&] { Kin::from_point(piola, jacobian, weight, out); });
+                     9 + 2 * 54 * 5;  // the Jacobian on both sides of 54 entries
   }
   const double n = view.num_nodes;
   double sums = 2 * 9 * n;  // nodes to points, or back: three components of three directions
@@ -116,16 +116,16 @@ SkinOperations count_skin_operations(const SkinLaw& law, const ElementView& view
     const double nl = view.product.line_nodes, np = view.product.plane_nodes;
     sums = 2 * 9 * (nl * np / view.product.line_points + nl);  // over the plane, then along the line
   }
-  // Material block: [6][9] and [9][9] sums of three products; geometric part.
-  const double block = 2 * 3 * (6 * 9 + 9 * 9) + 27;
+  // Material block: [6][9] and 54 sums of three products, twice its diagonal; geometric part.
+  const double block = 5 * (6 * 9 + 54) + 3 * 6 + 3 * 9 + 3 + 27;
   // Left factors: six blocks (a ≤ b) of three rows; products: three full blocks and three upper halves.
   double dense = 6 * 3 * 5 * n + 3 * 3 * 2 * n * n + 3 * 3 * n * (n + 1);
   if (view.product.line_points > 0) {
-    // Per point of the plane, of which each has line_points: 54 entries through the thickness, then left factors
-    // and products for every pair of (component, line node).
+    // Per point of the plane, of which each has line_points: nine sums through the thickness, left factors and products
+    // for every pair of (component, line node).
     const double nl = view.product.line_nodes, nz = view.product.line_points, np = view.product.plane_nodes,
                  pairs = 3 * nl * (3 * nl + 1) / 2;
-    dense = (54 * nl * nz * (1 + 2 * nl) + pairs * (3 * 5 * np + 2 * 3 * np * np)) / nz;
+    dense = pairs * (9 * (2 * nz - 1) + 3 * 5 * np + 2 * 3 * np * np) / nz;
   }
   total.residual = total.residual / view.num_points + 2 * sums;
   total.hessian = total.hessian / view.num_points + sums + block + dense;
