@@ -54,9 +54,10 @@ void Term::hessian(const StepInfo& step, const TermStepData& data, const VectorX
     const TermGroup& g = groups_[gi];
     const std::size_t size = static_cast<std::size_t>(3 * g.num_nodes) * (3 * g.num_nodes);
     const std::size_t work_size = hessian_work_size(g.padded_nodes, g.product.view());
-    // While elements of one chunk are computed, one thread adds those of the chunk before, in order. Few to a thread:
-    // matrices that do not stay in its cache cost a fifth of the elements.
-    const int chunk = std::min({32, 4 * num_threads(), g.num_elements});
+    // While elements of one chunk are computed, one thread adds those of the chunk before, in order. One thread alone
+    // takes few: a fifth of its time goes into matrices that leave its cache. Several gain nothing from that, and wait
+    // for each other at every chunk.
+    const int chunk = std::min(num_threads() == 1 ? 4 : 32, g.num_elements);
     struct Chunk {
       int first = 0, count = 0;
       std::vector<double> dense;
