@@ -26,7 +26,8 @@ RenderCase read_render(const json& j) {
   RenderCase c;
   c.width = j["width"], c.height = j["height"], c.supersampling = j["supersampling"];
   c.noise = j["noise"], c.seed = j["seed"], c.texture_scale = j["texture_scale"];
-  c.codec = j["codec"], c.finger = j["finger"], c.tilt = j["tilt"], c.truth_spacing = j["truth_spacing"];
+  c.codec = j["codec"], c.finger = j["finger"], c.finger_dots = j["finger_dots"], c.tilt = j["tilt"],
+  c.truth_spacing = j["truth_spacing"];
   return c;
 }
 

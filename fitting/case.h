@@ -50,6 +50,7 @@ struct RenderCase {
   double texture_scale = 0.5;                 ///< mm, typical size of skin marks
   std::string codec = "mjpg";                 ///< mjpg (avi) | h264 (mp4; small, but it removes the noise)
   bool finger = true;                         ///< draw the colliders
+  int finger_dots = 0;                        ///< dark dots drawn on each, for `finger --marker`
   double tilt = 20 * std::numbers::pi / 180;  ///< rad, of the automatic camera off the mean normal
   int truth_spacing = 16;                     ///< px between the material points of truth_tracks.csv
 };

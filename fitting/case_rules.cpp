@@ -41,8 +41,7 @@ std::vector<Rule> file_rules() {
       {.pointer = "/camera",
        .type = RuleType::path,
        .doc = "OpenCV camera (`rhytid calibrate`), or the folder of COLMAP's cameras.txt and images.txt; "
-              "default: "
-              "the automatic one."},
+              "default: the automatic one."},
       colmap_image("", ""),
       colmap_unit("", ""),
       {.pointer = "/footage", .type = RuleType::string, .fallback = "", .doc = "Video file."},
@@ -53,8 +52,8 @@ std::vector<Rule> file_rules() {
       {.pointer = "/measurements",
        .type = RuleType::path,
        .doc = "What was measured besides, CSV frame,quantity,value,sigma: force_FINGER_x, _y, _z (N, of the "
-              "skin on the "
-              "collider), wrinkle_amplitude, wrinkle_wavelength (mm, on the line of /fit/wrinkles)."},
+              "skin on the collider), wrinkle_amplitude, wrinkle_wavelength (mm, on the line of "
+              "/fit/wrinkles)."},
       {.pointer = "/truth", .type = RuleType::object, .doc = "What made the footage of a twin experiment."},
       {.pointer = "/truth/scene", .type = RuleType::path, .doc = "Scene; default: that of the fit."},
       {.pointer = "/truth/settings",
@@ -180,6 +179,12 @@ std::vector<Rule> render_rules() {
        .type = RuleType::boolean,
        .fallback = c.finger,
        .doc = "Whether the colliders are seen."},
+      {.pointer = "/render/finger_dots",
+       .type = RuleType::integer,
+       .fallback = 0,
+       .min = 0,
+       .max = 40,
+       .doc = "Dark dots on each collider that is seen, for `finger --marker`."},
       {.pointer = "/render/tilt",
        .dimension = dimension::angle,
        .fallback = c.tilt,
@@ -391,8 +396,8 @@ std::vector<Rule> fit_rules() {
       {.pointer = "/fit/consider",
        .type = RuleType::array,
        .doc = "Parameters that are held though they are not known exactly: what their error would move "
-              "enters the "
-              "intervals. Default: friction coefficients that are not fitted, to a factor 1.35. []: none."},
+              "enters the intervals. Default: friction coefficients that are not fitted, factor 1.35. []: "
+              "none."},
       {.pointer = "/fit/consider/*", .type = RuleType::object, .doc = "One of them."},
       {.pointer = "/fit/consider/*/address",
        .type = RuleType::string,
@@ -403,8 +408,7 @@ std::vector<Rule> fit_rules() {
        .min = 0,
        .min_is_open = true,
        .doc = "Its standard deviation, in the transformed value: of a logarithm for moduli, strengths, "
-              "friction; mm "
-              "for knots of a path."},
+              "friction; mm for knots of a path."},
       {.pointer = "/fit/starts",
        .type = RuleType::integer,
        .fallback = c.starts,

@@ -20,6 +20,7 @@ constexpr double kStep = 0.5;        // px between values of a profile: finer th
 constexpr double kLeastSpacing = 4;  // px between samples: nearer ones would see the same smoothed pixels
 constexpr int kFineSteps = 15;       // redrawings; three or four do unless samples change sides
 constexpr int kNarrowing = 4;        // of them until the windows are at their narrowest
+constexpr double kNarrowest = 1;     // px, first cut of residuals there
 constexpr double kSettled = 0.01;    // px that the outline moves from one redrawing to the next
 constexpr double kUnsettled = 0.3;   // px: still moving so much at the end is no answer
 constexpr double kTukey = 4.685;     // standard deviations: 95 % efficient for normal errors
@@ -248,32 +249,27 @@ std::vector<Sighting> edges_near(const SmoothPicture& picture, const Camera& cam
   return edges;
 }
 
-/// Cov(c) of finger_outline.h.
+/// Cov(c) of finger_outline.h. Edges of weight zero stay out; the others are weighted anew without each block.
 Mat3 centre_covariance(const std::vector<Sighting>& sightings, const std::vector<double>& weights,
                        const Vec3& centre, double radius, int count) {
-  constexpr int kLags = 4;  // samples: texture is rarely alike over more of the outline
-  std::vector<Vec3> pull(static_cast<std::size_t>(count), Vec3::Zero());
-  double curvature = 0, total = 0, fitting = 0;
-  for (std::size_t i = 0; i < sightings.size(); ++i) {
-    if (weights[i] <= 0) continue;
-    const Sighting& s = sightings[i];
-    const OutlineResidual e = outline_residual(s.ray, centre, radius, s.px_per_mm);
-    pull[static_cast<std::size_t>(s.sample)] = weights[i] * s.trust * e.value * e.by_centre;
-    // Tukey's ψ' = (1 − q) (1 − 5 q) where w = (1 − q)²
-    curvature += s.trust * std::sqrt(weights[i]) * (5 * std::sqrt(weights[i]) - 4);
-    total += s.trust * weights[i];
-    fitting += 1;
+  constexpr int kBlock = 5;  // samples: texture is rarely alike over more of the outline
+  Mat3 covariance = Mat3::Zero();
+  for (int first = 0; first < count; ++first) {
+    std::vector<Sighting> others;
+    for (std::size_t i = 0; i < sightings.size(); ++i)
+      if (weights[i] > 0 && (sightings[i].sample - first + count) % count >= kBlock)
+        others.push_back(sightings[i]);
+    Vec3 without = centre;
+    for (int pass = 0; pass < 20; ++pass) {
+      const auto again = tukey_weights(residuals_at(others, without, radius), kNarrowest);
+      const auto move = step(normal_equations(others, again, without, radius), radius);
+      if (!move) break;
+      without += *move;
+      if (move->norm() < 1e-6 * radius) break;
+    }
+    covariance += (without - centre) * (without - centre).transpose() / kBlock;
   }
-  Mat3 scatter = Mat3::Zero();
-  for (int i = 0; i < count; ++i)
-    for (int lag = -kLags; lag <= kLags; ++lag)
-      scatter += (1 - std::abs(lag) / (kLags + 1.0)) * pull[static_cast<std::size_t>(i)] *
-                 pull[static_cast<std::size_t>((i + lag + count) % count)].transpose();
-  // Heavy tails may cost most of the curvature; less than a quarter is no estimate any more.
-  const Mat3 inverse =
-      (std::max(0.25, curvature / total) * normal_equations(sightings, weights, centre, radius).hessian)
-          .inverse();
-  return fitting / std::max(1.0, fitting - 3) * inverse * scatter * inverse;
+  return covariance;
 }
 
 double largest_shift(const std::vector<OutlinePoint>& a, const Camera& camera, const Vec3& move) {
@@ -401,7 +397,8 @@ OutlineEstimate find_sphere(const cv::Mat& picture, const Camera& camera, const 
     if (outline.empty()) return lost("not in front of the camera");
     // In the end two of three edges that lie anywhere in the window would not fit: then runs of them are found
     // everywhere, and what is no outline is lost.
-    const double narrow = std::min(1.0, pass / (kNarrowing - 1.0)), window = 4 - narrow, widest = 2 - narrow;
+    const double narrow = std::min(1.0, pass / (kNarrowing - 1.0)), window = 4 - narrow,
+                 widest = 1 + kNarrowest - narrow;
     edges = edges_near(smooth, camera, outline, window);
     Vec3 centre = found.centre;
     weights = fit_centre(edges, found.samples, radius, widest, 2 * pass >= kNarrowing, centre);

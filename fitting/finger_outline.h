@@ -13,12 +13,13 @@
 // What hides a part of the outline (a hand, skin into which it sinks) leaves gradually: within 12° of a run of samples
 // that did not fit, samples are left out too.
 //
-//   Cov(c) = n/(n − 3) H⁻¹ (Σ_i Σ_|l|≤4 (1 − |l|/5) ψ_i ψ_{i+l} J_i J_{i+l}ᵀ) H⁻¹,   ψ = v w e,   H = Σ ψ' J Jᵀ
-// w are Tukey's weights, v = min(1, (g/usual g)²): a faint edge is less sure. The sum over l is there because
-// neighbours err alike. This holds what samples scatter, not what all err alike: a finger that is no sphere, a wrong
+//   Cov(c) = 1/5 Σ_b (c_b − c)(c_b − c)ᵀ,   c_b the fit without b, over all blocks b of 5 neighbours
+// A jackknife, by blocks because neighbours err alike. Each c_b has weights of its own, v w: w Tukey's, whose cut comes from
+// the residuals, v = min(1, (g/usual g)²), since a faint edge is less sure. A linearised variance at fixed weights is half
+// of that where few edges carry the fit: they pull it towards themselves, and the cut gives way to them. This holds what samples scatter, not what all err alike: a finger that is no sphere, a wrong
 // radius or camera. Size tells depth: a radius wrong by one per cent moves the centre by one per cent of its distance.
 //
-// Source  Harris and Stennett 1990 (RAPID); Armstrong and Zisserman 1995 (robust); Newey and West 1987 (lags).   Units  px, mm.
+// Source  Harris and Stennett 1990 (RAPID); Armstrong and Zisserman 1995 (robust); Künsch 1989 (blocks).   Units  px, mm.
 // Tests   tests/fitting/finger_outline_test.cpp
 #pragma once
 

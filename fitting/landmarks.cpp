@@ -187,6 +187,7 @@ std::vector<Landmark> read_landmarks(const std::string& path, double sigma,
       return number_of<double>(where, name, text(name), "a finite number");
     };
     Landmark l;
+    l.place = where;
     l.name = text("name");
     if (!is_utf8(l.name)) throw InputError(where, "name '" + shown_text(l.name) + "'", "text in UTF-8");
     if (l.name.empty() || !names.insert(l.name).second)
@@ -247,11 +248,13 @@ PoseEstimate estimate_pose(const std::vector<Landmark>& landmarks, const Camera&
   parts(estimate.covariance.topLeftCorner<3, 3>(), estimate.tilt_sigma, estimate.roll_sigma);
   parts(estimate.covariance.bottomRightCorner<3, 3>(), estimate.across_sigma, estimate.depth_sigma);
 
-  if (found->second < found->chi_square + 9 * std::max(1.0, estimate.reduced_chi_square))
+  if (found->second < found->chi_square + 9 * std::max(1.0, estimate.reduced_chi_square)) {
+    estimate.other_tilt = found->angle;
     estimate.doubts.push_back(
         "a pose tilted by " + short_text(kDegrees * found->angle, 2) +
         " degrees against this one explains the landmarks nearly as well: add some that "
         "lie nearer to or farther from the camera than the others");
+  }
   const double scale = std::sqrt(estimate.reduced_chi_square);
   bool is_one_wrong = false;
   if (n >= 5) {

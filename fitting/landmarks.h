@@ -29,6 +29,7 @@ struct Landmark {
   Vec2 pixel = Vec2::Zero();  ///< px, centres of pixels at integers
   Vec3 point = Vec3::Zero();  ///< mm, coordinates of the scene
   double sigma = 1;           ///< px, per axis
+  std::string place = {};     ///< "file:line", for messages; empty when it comes from no file
 };
 
 /// The pose and how well it is known.
@@ -41,6 +42,7 @@ struct PoseEstimate {
   Eigen::Matrix<double, 6, 6> covariance;    ///< of (ω, τ): rad, mm
   double tilt_sigma = 0, roll_sigma = 0;     ///< rad: across and about the line of sight
   double across_sigma = 0, depth_sigma = 0;  ///< mm: of the centroid across and along the line of sight
+  double other_tilt = 0;                     ///< rad to a pose that explains them nearly as well; 0: none
   std::vector<std::string> doubts;           ///< sentences
 };
 

@@ -14,7 +14,9 @@ Mat3 rotation_of(const Vec3& w) {
   return angle > 0 ? Eigen::AngleAxisd(angle, w / angle).toRotationMatrix() : Mat3::Identity();
 }
 
-Camera moved(const Camera& camera, const Vec3& middle, const Vector6d& step) {
+}  // namespace
+
+Camera moved_pose(const Camera& camera, const Vec3& middle, const Vector6d& step) {
   Camera next = camera;
   const Mat3 turn = rotation_of(step.head<3>());
   const Vec3 m = camera.rotation * middle + camera.translation;
@@ -22,8 +24,6 @@ Camera moved(const Camera& camera, const Vec3& middle, const Vector6d& step) {
   next.translation = turn * (camera.translation - m) + m + step.tail<3>();
   return next;
 }
-
-}  // namespace
 
 Vec3 centroid(const std::vector<SightedPoint>& points) {
   Vec3 sum = Vec3::Zero();
@@ -68,7 +68,7 @@ Camera refine_pose(const std::vector<SightedPoint>& points, const Camera& start)
   for (int iteration = 0; iteration < 100 && std::isfinite(here.chi_square) && damping < 1e12; ++iteration) {
     Matrix6d damped = here.hessian;
     damped.diagonal() *= 1 + damping;
-    const Camera next = moved(camera, middle, damped.ldlt().solve(here.gradient));
+    const Camera next = moved_pose(camera, middle, damped.ldlt().solve(here.gradient));
     const PoseNormal there = pose_normal(points, next);
     if (!(there.chi_square <= here.chi_square)) {
       damping *= 10;

@@ -38,6 +38,9 @@ Eigen::Matrix<double, 2, 6> pose_jacobian(const Camera& camera, const Vec3& poin
 
 PoseNormal pose_normal(const std::vector<SightedPoint>& points, const Camera& camera);
 
+/// The camera after a step (ω, τ) about `middle`, a world point.
+Camera moved_pose(const Camera& camera, const Vec3& middle, const Vector6d& step);
+
 /// The camera with the pose that minimises χ² from its own as a start, to rounding (Gauss-Newton, damped).
 /// A start with points behind it is returned as it is.
 Camera refine_pose(const std::vector<SightedPoint>& points, const Camera& start);

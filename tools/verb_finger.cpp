@@ -1,13 +1,10 @@
-// rhytid finger: the path of the finger from footage, by its outline.
+// rhytid finger: the path of the finger from footage, by its outline or by a marker on it.
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "fitting/case.h"
 #include "fitting/case_camera.h"
@@ -20,24 +17,19 @@
 #include "sim/scene/load.h"
 #include "sim/scene/names.h"
 #include "tools/clip_argument.h"
+#include "tools/finger_by_marker.h"
+#include "tools/finger_files.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
 namespace {
 
 namespace fs = std::filesystem;
-using fitting::OutlineEstimate;
 
-/// What one frame says.
-struct FingerFrame {
-  int index = 0;
-  double time = 0;  ///< s, on the clock of the path
-  BodyPose of_scene;
-  OutlineEstimate found;
-};
-
-/// The sphere that is meant; the only collider, or the one named. Throws InputError for other shapes.
-const ColliderScene& chosen_collider(const Scene& scene, const std::string& file, const std::string& name) {
+/// The collider that is meant; the only one, or the one named. Throws InputError, too for what has no outline
+/// of its own when that is what is followed.
+const ColliderScene& chosen_collider(const Scene& scene, const std::string& file, const std::string& name,
+                                     bool by_outline) {
   const ColliderScene* chosen = nullptr;
   std::string names;
   for (const ColliderScene& c : scene.colliders) {
@@ -47,124 +39,30 @@ const ColliderScene& chosen_collider(const Scene& scene, const std::string& file
   if (scene.colliders.empty()) throw InputError(file + ": /colliders", "none", "a sphere: the finger");
   if (chosen == nullptr)
     throw InputError("--collider", name.empty() ? "nothing" : "'" + name + "'", "one of " + names);
-  if (chosen->shape != ShapeKind::sphere)
-    throw InputError(file + ": /colliders/" + chosen->name + "/shape", "'" + to_string(chosen->shape) + "'",
-                     "a sphere: the outline of another shape also depends on how it is turned");
+  if (by_outline && chosen->shape != ShapeKind::sphere)
+    throw InputError(
+        file + ": /colliders/" + chosen->name + "/shape", "'" + to_string(chosen->shape) + "'",
+        "a sphere: the outline of another shape also depends on how it is turned (--marker follows any)");
   return *chosen;
 }
 
-void draw_outline(cv::Mat& picture, const fitting::Camera& camera, const Vec3& centre, double radius,
-                  const cv::Scalar& colour) {
-  constexpr int kShift = 4;  // OpenCV draws at 1/16 px
-  std::vector<cv::Point> corners;
-  for (const fitting::OutlinePoint& p : fitting::sphere_outline(centre, radius, camera, 180))
-    corners.emplace_back(cvRound(16 * std::clamp(p.pixel.x(), -1e4, 1e5)),
-                         cvRound(16 * std::clamp(p.pixel.y(), -1e4, 1e5)));
-  if (!corners.empty()) cv::polylines(picture, corners, true, colour, 1, cv::LINE_AA, kShift);
-}
-
-/// Blue: the scene's path; green: what was found; dots: edges that fit, red ones that do not.
-cv::Mat drawn(const cv::Mat& colour, const FingerFrame& frame, const fitting::Camera& camera, double radius) {
-  cv::Mat picture = colour.clone();
-  draw_outline(picture, camera, frame.of_scene.centre, radius, {230, 120, 40});
-  if (frame.found.lost.empty()) draw_outline(picture, camera, frame.found.centre, radius, {60, 220, 60});
-  for (const fitting::OutlineEdge& edge : frame.found.edges)
-    cv::circle(picture, {cvRound(edge.pixel.x()), cvRound(edge.pixel.y())}, std::max(1, picture.cols / 400),
-               edge.weight > 0.05 ? cv::Scalar(60, 220, 60) : cv::Scalar(40, 40, 230), cv::FILLED,
-               cv::LINE_AA);
-  const std::string text =
-      "frame " + std::to_string(frame.index) + (frame.found.lost.empty() ? "" : ": lost");
-  for (const int width : {3, 1})
-    cv::putText(picture, text, {8, picture.rows - 10}, cv::FONT_HERSHEY_SIMPLEX,
-                std::max(0.5, picture.cols / 1200.0), width == 3 ? cv::Scalar::all(0) : cv::Scalar::all(255),
-                width, cv::LINE_AA);
-  return picture;
-}
-
-/// Pictures of one size, two beside each other.
-cv::Mat tiled(std::vector<cv::Mat> pictures) {
-  if (pictures.size() % 2 == 1 && pictures.size() > 1)
-    pictures.push_back(cv::Mat::zeros(pictures.front().size(), pictures.front().type()));
-  if (pictures.size() == 1) return pictures.front();
-  std::vector<cv::Mat> rows;
-  for (std::size_t i = 0; i + 1 < pictures.size(); i += 2) {
-    cv::Mat row;
-    cv::hconcat(pictures[i], pictures[i + 1], row);
-    rows.push_back(row);
+/// Where the scene has the finger, by frame.
+std::vector<FingerFrame> frames_of_scene(const Scene& scene, const ColliderScene& collider) {
+  const ColliderMotion motion(collider, scene.time.offset);
+  std::vector<FingerFrame> frames;
+  for (int f = 0; f <= scene.time.frames; ++f) {
+    FingerFrame& frame = frames.emplace_back();
+    const double time = f / scene.time.frame_rate;
+    frame.index = f;
+    frame.time = time + scene.time.offset;
+    frame.of_scene = frame.found = motion.at(time);
   }
-  cv::Mat all;
-  cv::vconcat(rows, all);
-  return all;
+  return frames;
 }
 
-/// As `path_file` reads it; how the body turns stays as in the scene. Empty when all frames are lost.
-std::string path_text(const std::vector<FingerFrame>& frames, bool turns) {
-  std::string text;
-  for (const FingerFrame& f : frames) {
-    if (!f.found.lost.empty()) continue;
-    text += exact_text(f.time);
-    for (int k = 0; k < 3; ++k) text += "," + exact_text(f.found.centre[k]);
-    if (turns) {
-      const Eigen::Quaterniond q(f.of_scene.rotation);
-      for (const double part : {q.w(), q.x(), q.y(), q.z()}) text += "," + exact_text(part);
-    }
-    text += "\n";
-  }
-  if (text.empty()) return text;
-  return (turns ? "time,x,y,z,qw,qx,qy,qz\n" : "time,x,y,z\n") + text;
-}
-
-struct Distance {
-  double rms = 0, largest = 0;  ///< mm from the scene's path
-  double rms_px = 0, across_sigma = 0, depth_sigma = 0;
-  int found = 0, lost = 0;
-};
-
-Distance distance_of(const std::vector<FingerFrame>& frames) {
-  Distance d;
-  for (const FingerFrame& f : frames) {
-    if (!f.found.lost.empty()) {
-      ++d.lost;
-      continue;
-    }
-    ++d.found;
-    const double off = (f.found.centre - f.of_scene.centre).norm();
-    d.rms += off * off;
-    d.largest = std::max(d.largest, off);
-    d.rms_px += f.found.rms * f.found.rms;
-    d.across_sigma = std::max(d.across_sigma, f.found.across_sigma);
-    d.depth_sigma = std::max(d.depth_sigma, f.found.depth_sigma);
-  }
-  const double n = std::max(1, d.found);
-  d.rms = std::sqrt(d.rms / n);
-  d.rms_px = std::sqrt(d.rms_px / n);
-  return d;
-}
-
-nlohmann::ordered_json finger_json(const std::vector<FingerFrame>& frames, const ColliderScene& collider,
-                                   const Distance& distance) {
-  using nlohmann::ordered_json;
-  const auto list = [](const Vec3& v) { return ordered_json{v[0], v[1], v[2]}; };
-  ordered_json rows = ordered_json::array();
-  for (const FingerFrame& f : frames) {
-    ordered_json& row = rows.emplace_back(ordered_json{{"frame", f.index},
-                                                       {"time_s", f.time},
-                                                       {"scene_mm", list(f.of_scene.centre)},
-                                                       {"lost", !f.found.lost.empty()}});
-    row["samples"] = f.found.samples;
-    row["used"] = f.found.used;
-    if (!f.found.lost.empty()) {
-      row["why"] = f.found.lost;
-      continue;
-    }
-    row["centre_mm"] = list(f.found.centre);
-    row["sigma_mm"] = list(f.found.covariance.diagonal().cwiseSqrt());
-    row["across_sigma_mm"] = f.found.across_sigma;
-    row["depth_sigma_mm"] = f.found.depth_sigma;
-    row["rms_px"] = f.found.rms;
-  }
-  return {{"collider", collider.name},        {"radius_mm", collider.radius},         {"lost", distance.lost},
-          {"off_scene_rms_mm", distance.rms}, {"off_scene_max_mm", distance.largest}, {"frames", rows}};
+/// Frames that are shown: four, spread evenly.
+bool is_shown(int frame, std::size_t shown, int asked) {
+  return shown < 4 && frame >= static_cast<int>(shown) * (asked - 1) / 3;
 }
 
 class FingerVerb final : public Verb {
@@ -172,7 +70,7 @@ class FingerVerb final : public Verb {
   VerbHelp help() const override {
     return {
         "finger",
-        "the path of the finger from footage, by its outline",
+        "the path of the finger from footage, by its outline or by a marker on it",
         "Follows the outline of a spherical collider through the footage and writes where its centre was in "
         "every frame, as a path for the scene. The search starts each frame at the scene's path, corrected "
         "by "
@@ -182,19 +80,55 @@ class FingerVerb final : public Verb {
         "sight "
         "the centre is known worst. Parts of the outline that are hidden are left out; a frame with less "
         "than a "
-        "third of it is lost. Exit 3 when more than half of the frames are.",
-        "case.json with its footage, camera and scene",
-        "finger.csv (for /colliders/NAME/path_file), finger.json (deviations, edges used), finger.png (four "
-        "frames: blue the scene's outline, green the one found). Prints how far it is from the scene's path",
-        "rhytid finger case.json -o run/finger"};
+        "third of it is lost.\n"
+        "With --marker it follows dots on the nail or finger instead, for a collider of any shape. Name the "
+        "pixel of "
+        "each in the first frame and its place on the finger, from the collider's centre along the "
+        "collider's axes (as "
+        "long as the scene does not turn it: the scene's). Four dots or more, not on a line, tell how the "
+        "finger turns "
+        "too; two or three only where it is, by their distance how far from the camera; one is refused "
+        "without "
+        "--depth-of-scene. What pixels and places are off by shifts the whole path alike: finger.json has "
+        "deviations "
+        "with it (sigma_mm) and without (own_sigma_mm).\n"
+        "Exit 3 when more than half of the frames are lost, or the marker's points do not agree.",
+        "case.json with its footage, camera and scene; with --marker a CSV of name,x_px,y_px,x_mm,y_mm,z_mm, "
+        "and maybe "
+        "sigma_px",
+        "finger.csv (for /colliders/NAME/path_file), finger.json (deviations, edges or points used), "
+        "finger.png (four "
+        "frames: blue the scene's outline, green the one found); with --marker finger_tracks.csv. Prints how "
+        "far it is "
+        "from the scene's path",
+        "rhytid finger case.json -o run/finger\nrhytid finger case.json --marker dots.csv -o run/finger"};
   }
   bool takes_case() const override { return true; }
   void add_options(CLI::App& app) override {
     app.add_option("--collider", collider_, "which collider of the scene (default: the only one)")
         ->option_text("NAME");
-    app.add_option("--window", window_, "how far from where it is expected an edge is looked for, px (12)")
+    CLI::Option* window = app.add_option("--window", window_,
+                                         "how far from where it is expected an edge is looked for, px (12)")
+                              ->option_text("PX")
+                              ->check(CLI::Range(4.0, 60.0));
+    CLI::Option* marker = app.add_option("--marker", marker_.file,
+                                         "CSV of points on the finger: follow them instead of the outline")
+                              ->option_text("FILE")
+                              ->excludes(window);
+    app.add_option("--sigma", marker_.sigma,
+                   "deviation of a marker point per axis, px, of its pixel and its place as it is seen "
+                   "together, where "
+                   "the CSV has none (1)")
         ->option_text("PX")
-        ->check(CLI::Range(4.0, 60.0));
+        ->check(CLI::Range(1e-3, 1e3))
+        ->needs(marker);
+    app.add_flag("--hold-rotation", marker_.options.hold_rotation,
+                 "the finger turns as the scene's path says, however many points there are")
+        ->needs(marker);
+    app.add_flag(
+           "--depth-of-scene", marker_.options.depth_of_scene,
+           "keep the centre's depth along the camera's axis, and the rotation, as the scene's path says")
+        ->needs(marker);
     add_clip_option(app, clip_);
   }
 
@@ -203,8 +137,9 @@ class FingerVerb final : public Verb {
                                           clip_, context.options.output);
     const fitting::Case& c = chosen.of_view;
     const std::string& folder = chosen.folder;
+    const bool by_marker = !marker_.file.empty();
     const Scene scene = load_scene(c.scene, c.scene_settings);
-    const ColliderScene& collider = chosen_collider(scene, c.scene, collider_);
+    const ColliderScene& collider = chosen_collider(scene, c.scene, collider_, !by_marker);
     if (c.camera.empty() && !fs::exists(fitting::camera_path(c, folder)))
       throw InputError(c.file + ": /camera", "nothing",
                        "a camera file, or one beside rendered footage in " + folder);
@@ -215,8 +150,13 @@ class FingerVerb final : public Verb {
     options.path = footage;
     options.last = scene.time.frames;
     fitting::FrameSource source(options);
-    (void)context.output_folder();
+    marker_.track = c.track;
+    marker_.options.floor = c.fit.min_sigma;
+    marker_.options.huber = c.fit.robust_scale;
+    std::vector<fitting::Landmark> marker;
     const fitting::Camera camera = fitting::read_camera(fitting::case_camera_file(c, folder));
+    if (by_marker) marker = read_marker_in(marker_, camera);
+    (void)context.output_folder();
     if (source.size() != cv::Size(camera.width, camera.height))
       throw InputError(
           footage, std::to_string(source.size().width) + " x " + std::to_string(source.size().height) + " px",
@@ -227,63 +167,106 @@ class FingerVerb final : public Verb {
       context.progress.warning(
           "the path is in the frame of the camera: what the head moves is not taken out");
 
-    std::vector<cv::Mat> pictures;
-    std::vector<FingerFrame> frames;
-    if (!follow(source, camera, scene, collider, context.progress, frames, pictures))
+    Found found;
+    found.frames = frames_of_scene(scene, collider);
+    found.turns = std::any_of(collider.path.begin(), collider.path.end(),
+                              [](const PathKnot& k) { return !k.rotation.isZero(0); });
+    if (by_marker ? !follow_marker(source, marker, camera, collider, folder, context.progress, found)
+                  : !follow_outline(source, camera, collider, context.progress, found))
       return ExitCode::interrupted;
-    return write(frames, pictures, collider, folder, context);
+    if (static_cast<int>(found.frames.size()) <= scene.time.frames)
+      context.progress.warning(footage + " has " + counted(static_cast<long>(found.frames.size()), "frame") +
+                               ", the scene " + std::to_string(scene.time.frames + 1) +
+                               ": after the last one the path stays where it is");
+    return write(found, collider, folder, context);
   }
 
  private:
+  /// What comes of either way.
+  struct Found {
+    std::vector<FingerFrame> frames;
+    std::vector<cv::Mat> pictures;
+    bool turns = false;
+    nlohmann::ordered_json record;
+    std::vector<std::string> doubts;
+    std::string words;  ///< what the deviations rest on
+  };
+
   /// False when interrupted. Throws InputError for footage without a frame.
-  bool follow(fitting::FrameSource& source, const fitting::Camera& camera, const Scene& scene,
-              const ColliderScene& collider, Progress& progress, std::vector<FingerFrame>& frames,
-              std::vector<cv::Mat>& pictures) const {
-    const ColliderMotion motion(collider, scene.time.offset);
-    const int asked = std::min(source.frames_asked(), scene.time.frames + 1);
+  bool follow_outline(fitting::FrameSource& source, const fitting::Camera& camera,
+                      const ColliderScene& collider, Progress& progress, Found& found) const {
+    const int asked = std::min<int>(source.frames_asked(), static_cast<int>(found.frames.size()));
     progress.stage("finger", asked);
     Vec3 correction = Vec3::Zero();  // of the scene's path: what the frame before needed, mm
+    std::vector<FingerFrame> frames;
     while (std::optional<fitting::Frame> picture = source.next()) {
-      FingerFrame frame;
-      frame.index = picture->index;
-      const double time = frame.index / scene.time.frame_rate;
-      frame.time = time + scene.time.offset;
-      frame.of_scene = motion.at(time);
-      frame.found = fitting::find_sphere(picture->colour, camera, frame.of_scene.centre + correction,
-                                         collider.radius, {.window = window_});
-      if (frame.found.lost.empty())
+      FingerFrame& frame = frames.emplace_back(found.frames[static_cast<std::size_t>(picture->index)]);
+      const fitting::OutlineEstimate outline = fitting::find_sphere(
+          picture->colour, camera, frame.of_scene.centre + correction, collider.radius, {.window = window_});
+      frame.lost = outline.lost;
+      frame.found.centre = outline.centre;
+      frame.covariance = outline.covariance;
+      frame.across_sigma = outline.across_sigma;
+      frame.depth_sigma = outline.depth_sigma;
+      frame.rms = outline.rms;
+      frame.more = {{"samples", outline.samples}, {"used", outline.used}};
+      for (const fitting::OutlineEdge& edge : outline.edges)
+        frame.signs.push_back({edge.pixel, edge.weight > 0.05});
+      if (frame.lost.empty())
         correction = frame.found.centre - frame.of_scene.centre;
       else
-        progress.warning("frame " + std::to_string(frame.index) + " is lost: " + frame.found.lost);
-      const int shown = static_cast<int>(pictures.size());
-      if (shown < 4 && frame.index >= shown * (asked - 1) / 3)
-        pictures.push_back(drawn(picture->colour, frame, camera, collider.radius));
-      frames.push_back(std::move(frame));
+        progress.warning("frame " + std::to_string(frame.index) + " is lost: " + frame.lost);
+      if (is_shown(frame.index, found.pictures.size(), asked))
+        found.pictures.push_back(drawn_finger(picture->colour, frame, camera, collider));
       progress.step_done(static_cast<int>(frames.size()));
       if (progress.interrupted()) return false;
     }
     if (frames.empty()) throw InputError(source.options().path, "no frame", "a readable video or stills");
-    if (static_cast<int>(frames.size()) <= scene.time.frames)
-      progress.warning(source.options().path + " has " + counted(static_cast<long>(frames.size()), "frame") +
-                       ", the scene " + std::to_string(scene.time.frames + 1) +
-                       ": after the last one the path stays where it is");
+    found.frames = std::move(frames);
+    found.record = {{"radius_mm", collider.radius}};
+    found.words = "for a radius of exactly " + short_text(collider.radius) + " mm";
     return true;
   }
 
-  static ExitCode write(const std::vector<FingerFrame>& frames, const std::vector<cv::Mat>& pictures,
-                        const ColliderScene& collider, const std::string& folder, VerbContext& context) {
+  /// The same.
+  bool follow_marker(fitting::FrameSource& source, const std::vector<fitting::Landmark>& marker,
+                     const fitting::Camera& camera, const ColliderScene& collider, const std::string& folder,
+                     Progress& progress, Found& found) const {
+    MarkerFinding finding = find_by_marker(marker_, marker, source, camera, found.frames, progress);
+    if (finding.interrupted) return false;
+    found.frames = std::move(finding.frames);
+    found.turns = found.turns || finding.turns;
+    found.record = std::move(finding.record);
+    found.doubts = std::move(finding.doubts);
+    found.words =
+        "of it from frame to frame up to " + short_text(finding.own_sigma, 2) + " mm in any direction" +
+        (finding.turns ? "; its turning was found too" : "; it turns as in the scene") +
+        (marker_.options.depth_of_scene ? ", and has the scene's depth, whose error is not stated" : "");
+    fitting::write_tracks(finding.tracks, (fs::path(folder) / "finger_tracks.csv").string());
+    fitting::FrameSource again(source.options());
+    const auto count = static_cast<int>(found.frames.size());
+    while (std::optional<fitting::Frame> picture = again.next()) {
+      if (picture->index >= count || found.pictures.size() == 4) break;
+      if (is_shown(picture->index, found.pictures.size(), count))
+        found.pictures.push_back(drawn_finger(
+            picture->colour, found.frames[static_cast<std::size_t>(picture->index)], camera, collider));
+    }
+    return true;
+  }
+
+  static ExitCode write(const Found& found, const ColliderScene& collider, const std::string& folder,
+                        VerbContext& context) {
     const auto in = [&folder](const char* name) { return (fs::path(folder) / name).string(); };
-    const bool turns = std::any_of(collider.path.begin(), collider.path.end(),
-                                   [](const PathKnot& k) { return !k.rotation.isZero(0); });
-    const Distance distance = distance_of(frames);
-    std::vector<unsigned char> png;
-    if (!cv::imencode(".png", tiled(pictures), png))
-      throw InputError(folder, "no picture", "a picture that can be written");
-    const std::string path = path_text(frames, turns);
+    const std::vector<FingerFrame>& frames = found.frames;
+    const FingerSummary summary = summary_of(frames);
+    const std::string png = tiled_png(found.pictures, folder), path = path_text(frames, found.turns);
     std::error_code ignored;
     fs::remove(in("finger.csv"), ignored);  // of an earlier run: it must not stand beside another's record
-    write_file(in("finger.json"), finger_json(frames, collider, distance).dump(1) + "\n");
-    write_file(in("finger.png"), std::string(png.begin(), png.end()));
+    write_file(in("finger.json"),
+               finger_json(frames, collider, found.record)
+                       .dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                   "\n");
+    write_file(in("finger.png"), png);
     if (path.empty()) {
       context.progress.warning(
           "the finger was found in no frame: no path is written (see finger.png: does the hand hide the tip, "
@@ -292,23 +275,25 @@ class FingerVerb final : public Verb {
       return ExitCode::not_converged;
     }
     write_file(in("finger.csv"), path);
-    context.out << in("finger.csv") << ": '" << collider.name << "' in " << distance.found << " of "
-                << counted(static_cast<long>(frames.size()), "frame") << ", outline to "
-                << short_text(distance.rms_px, 2) << " px rms\noff the scene's path by "
-                << short_text(distance.rms, 3) << " mm rms, at most " << short_text(distance.largest, 3)
-                << " mm; deviations up to " << short_text(distance.across_sigma, 2) << " mm across and "
-                << short_text(distance.depth_sigma, 2)
-                << " mm along the line of sight, for a radius of exactly " << short_text(collider.radius)
-                << " mm\nin the scene, in place of \"path\" of /colliders/" << collider.name
+    context.out << in("finger.csv") << ": '" << collider.name << "' in " << summary.found << " of "
+                << counted(static_cast<long>(frames.size()), "frame") << ", to "
+                << short_text(summary.rms_px, 2) << " px rms\noff the scene's path by "
+                << short_text(summary.off_rms, 3) << " mm rms, at most " << short_text(summary.off_largest, 3)
+                << " mm; deviations up to " << short_text(summary.across_sigma, 2) << " mm across and "
+                << short_text(summary.depth_sigma, 2) << " mm along the line of sight, " << found.words
+                << "\nin the scene, in place of \"path\" of /colliders/" << collider.name
                 << ": \"path_file\": \"finger.csv\" (from the scene's folder)\n";
-    if (2 * distance.lost <= static_cast<int>(frames.size())) return ExitCode::ok;
-    context.progress.warning("doubtful path: " + std::to_string(distance.lost) + " of " +
-                             counted(static_cast<long>(frames.size()), "frame") + " are lost");
-    return ExitCode::not_converged;
+    for (const std::string& doubt : found.doubts) context.progress.warning("doubtful path: " + doubt);
+    const bool is_mostly_lost = 2 * summary.lost > static_cast<int>(frames.size());
+    if (is_mostly_lost)
+      context.progress.warning("doubtful path: " + std::to_string(summary.lost) + " of " +
+                               counted(static_cast<long>(frames.size()), "frame") + " are lost");
+    return is_mostly_lost || !found.doubts.empty() ? ExitCode::not_converged : ExitCode::ok;
   }
 
   std::string collider_, clip_;
   double window_ = 12;
+  MarkerJob marker_;
 };
 
 }  // namespace

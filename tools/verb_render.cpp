@@ -10,6 +10,7 @@
 #include "fitting/case_camera.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
+#include "sim/output/text.h"
 #include "sim/scene/load.h"
 #include "tools/clip_argument.h"
 #include "tools/footage_record.h"
@@ -32,6 +33,20 @@ std::string footage_in(const fitting::Case& c, const std::string& folder) {
   return (fs::path(folder) / (c.render.codec == "h264" ? "footage.mp4" : "footage.avi")).string();
 }
 
+/// Dots as `rhytid finger --marker` reads them, exact.
+std::string marker_text(const Finger& finger, const fitting::Camera& camera, int count) {
+  std::string text = "name,x_px,y_px,x_mm,y_mm,z_mm,sigma_px\n";
+  int number = 0;
+  for (const Vec3& dot : finger_dots(finger, camera, count)) {
+    text += "dot" + std::to_string(++number);
+    const Vec2 pixel = camera.project(finger.tip + finger.rotation * dot);
+    for (const double value : {pixel.x(), pixel.y(), dot.x(), dot.y(), dot.z(), 0.05})
+      text += "," + exact_text(value);
+    text += "\n";
+  }
+  return text;
+}
+
 class Render : public Verb {
  public:
   VerbHelp help() const override {
@@ -44,7 +59,7 @@ class Render : public Verb {
         "tracking and fitting can be judged. Use it for twin experiments: can the parameters be found again?",
         "case.json, its scenes and camera",
         "footage.avi or .mp4, frame_*.png (first, middle, last), camera.yaml, truth_tracks.csv, truth.json, "
-        "truth_motion.bin",
+        "truth_motion.bin; with /render/finger_dots marker_NAME.csv, where the dots are",
         "rhytid render data/scenes/demo/case.json -o run/demo"};
   }
   bool takes_case() const override { return true; }
@@ -79,6 +94,7 @@ class Render : public Verb {
         c.camera.empty() ? automatic_camera(twin.surface, c.render.width, c.render.height, c.render.tilt)
                          : fitting::read_case_camera(c);
     if (!film(context, c, truth.scene(), twin.surface, camera, folder)) return ExitCode::interrupted;
+    write_markers(c, truth.scene(), twin.surface, camera, folder);
     nlohmann::json record = truth_record(fit, truth, stride, twin.surface.frames());
     record["footage"].update(footage_record(footage_in(c, folder)));
     write_file(in_folder("truth.json"), record.dump(2) + "\n");
@@ -88,6 +104,21 @@ class Render : public Verb {
   }
 
  private:
+  /// A file for every finger that has dots; that of an earlier run goes.
+  static void write_markers(const fitting::Case& c, const Scene& truth, const MovingSurface& surface,
+                            const fitting::Camera& camera, const std::string& folder) {
+    const std::vector<Finger> fingers = fingers_at(truth, 0, finger_direction(surface.mean_normal(), camera));
+    std::size_t finger = 0;
+    for (const ColliderScene& collider : truth.colliders) {
+      if (collider.shape != ShapeKind::sphere) continue;
+      const std::string path = (fs::path(folder) / ("marker_" + collider.name + ".csv")).string();
+      const Finger& drawn = fingers[finger++];
+      fs::remove(path);
+      if (c.render.finger && c.render.finger_dots > 0)
+        write_file(path, marker_text(drawn, camera, c.render.finger_dots));
+    }
+  }
+
   /// What cannot be encoded is refused before the truth is simulated, which may take hours.
   static void require_encoder(const fitting::Case& c, const Scene& fit, const std::string& folder) {
     int width = c.render.width, height = c.render.height;

@@ -1,11 +1,12 @@
 #include "tools/render/finger.h"
-#include "sim/scene/collider_motion.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+
+#include "sim/scene/collider_motion.h"
 
 namespace rhytid::tools {
 namespace {
@@ -57,10 +58,31 @@ std::vector<Finger> fingers_at(const Scene& scene, double time, const Vec3& dire
   std::vector<Finger> fingers;
   for (const ColliderScene& collider : scene.colliders) {
     if (collider.shape != ShapeKind::sphere) continue;
-    const Vec3 tip = ColliderMotion(collider, scene.time.offset).at(time).centre;
-    fingers.push_back({tip, tip + 1.2 * collider.radius * direction, collider.radius});
+    const ColliderMotion motion(collider, scene.time.offset);
+    const BodyPose now = motion.at(time);
+    const Vec3 turned = now.rotation * motion.at(0).rotation.transpose() * direction;
+    fingers.push_back(
+        {now.centre, now.centre + 1.2 * collider.radius * turned, collider.radius, now.rotation});
   }
   return fingers;
+}
+
+std::vector<Vec3> finger_dots(const Finger& finger, const fitting::Camera& camera, int count) {
+  const Vec3 eye = camera.centre(), middle = 0.5 * (finger.tip + finger.end),
+             sight = (middle - eye).normalized(), side = sight.unitOrthogonal(), third = sight.cross(side);
+  std::vector<Vec3> dots;
+  for (int k = 0; k < count; ++k) {
+    const double angle = 2 * std::numbers::pi * k / std::max(1, count - 1),
+                 far = k == 0 ? 0 : 0.5 * finger.radius;
+    const Vec3 toward = middle + far * (std::cos(angle) * side + std::sin(angle) * third) - eye;
+    if (const auto s = finger.hit(eye, toward))
+      dots.push_back(finger.rotation.transpose() * (eye + *s * toward - finger.tip));
+  }
+  return dots;
+}
+
+double dot_radius(const Finger& finger) {
+  return 0.05 * finger.radius;
 }
 
 std::vector<cv::Point2f> finger_outline(const Finger& finger, const fitting::Camera& camera,

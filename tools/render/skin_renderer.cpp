@@ -113,6 +113,9 @@ SkinRenderer::SkinRenderer(const MovingSurface& surface, const SubdividedSurface
   Vec3 across = 0.85 * left + 0.53 * top;
   across = (across - across.dot(up_) * up_).normalized();
   const double elevation = 40 * std::numbers::pi / 180;
+  if (options.finger_dots > 0)
+    for (const Finger& finger : fingers_at(scene, surface.times.front(), finger_direction_))
+      dots_.push_back(finger_dots(finger, camera, options.finger_dots));
   light_ = std::cos(elevation) * across + std::sin(elevation) * up_;
   if (!has_distortion(camera)) return;
   const int n = options.supersampling;
@@ -195,9 +198,16 @@ Vec3 SkinRenderer::skin_colour(const Lit& lit, size_t index) const {
   return shaded(texture_.albedo(X), x, normal, open, shadow, 0.035);
 }
 
-Vec3 SkinRenderer::finger_colour(const Lit&, const Finger& finger, const Vec3& point) const {
-  const Vec3 normal = (point - finger.axis_point(point)).normalized();
-  const Vec3 albedo = finger_texture_.albedo(point - finger.tip, false).cwiseProduct(Vec3(1.10, 0.84, 0.80));
+Vec3 SkinRenderer::finger_colour(const Lit& lit, std::size_t index, const Vec3& point) const {
+  const Finger& finger = lit.fingers[index];
+  const Vec3 normal = (point - finger.axis_point(point)).normalized(),
+             place = finger.rotation.transpose() * (point - finger.tip);
+  Vec3 albedo = finger_texture_.albedo(place, false).cwiseProduct(Vec3(1.10, 0.84, 0.80));
+  if (!dots_.empty())
+    for (const Vec3& dot : dots_[index]) {
+      const double radius = dot_radius(finger);
+      albedo *= 0.1 + 0.9 * smoothstep(0.85 * radius, 1.15 * radius, (place - dot).norm());
+    }
   // The under side sees skin, not sky.
   const double open = 0.35 + 0.65 * smoothstep(-0.9, 0.6, normal.dot(up_));
   return shaded(albedo, point, normal, open, smoothstep(-0.5, 0.2, normal.dot(light_)), 0.06);
@@ -212,7 +222,7 @@ Vec3 SkinRenderer::background(const Vec2& pixel) const {
 
 Vec3 SkinRenderer::sample(const Lit& lit, size_t index, const Vec2& pixel) const {
   const double skin_depth = lit.buffer.depth[index];
-  const Finger* nearest = nullptr;
+  std::size_t nearest = lit.fingers.size();
   double depth = skin_depth;
   Vec3 toward;
   for (size_t i = 0; i < lit.fingers.size(); ++i) {
@@ -222,9 +232,9 @@ Vec3 SkinRenderer::sample(const Lit& lit, size_t index, const Vec2& pixel) const
     toward = camera_.rotation.transpose() * Vec3(xy.x(), xy.y(), 1);
     const auto s = lit.fingers[i].hit(eye_, toward);
     if (!s || *s >= depth) continue;
-    depth = *s, nearest = &lit.fingers[i];
+    depth = *s, nearest = i;
   }
-  if (nearest != nullptr) return finger_colour(lit, *nearest, eye_ + depth * toward);
+  if (nearest < lit.fingers.size()) return finger_colour(lit, nearest, eye_ + depth * toward);
   return lit.buffer.triangle[index] >= 0 ? skin_colour(lit, index) : background(pixel);
 }
 

@@ -48,7 +48,7 @@ class SkinRenderer {
   VisibilityBuffer visibility(const MatrixX3& positions) const;
   Vec3 sample(const Lit& lit, size_t index, const Vec2& pixel) const;
   Vec3 skin_colour(const Lit& lit, size_t index) const;
-  Vec3 finger_colour(const Lit& lit, const Finger& finger, const Vec3& point) const;
+  Vec3 finger_colour(const Lit& lit, std::size_t finger, const Vec3& point) const;
   Vec3 background(const Vec2& pixel) const;
   Vec3 shaded(const Vec3& albedo, const Vec3& point, const Vec3& normal, double ambient_occlusion,
               double shadow, double gloss) const;
@@ -61,6 +61,7 @@ class SkinRenderer {
   fitting::RenderCase options_;
   SkinTexture texture_, finger_texture_;
   MatrixX3 rest_;
+  std::vector<std::vector<Vec3>> dots_;  ///< by finger, in its axes
   Vec3 up_, light_, finger_direction_, eye_;
   std::vector<Vec2> undistorted_;  ///< per sample, only for a camera with distortion
 };
