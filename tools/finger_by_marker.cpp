@@ -121,6 +121,8 @@ MarkerFinding find_by_marker(const MarkerJob& job, const std::vector<fitting::La
   warn_of_lost(finding.frames, progress);
   finding.turns = motion.turns;
   finding.record = record_of(marker, motion, job);
+  finding.record["frames_asked"] = finding.asked;
+  finding.record["frames_processed"] = finding.frames.size();
   finding.doubts = motion.doubts;
   finding.tracks = std::move(tracked.tracks);
   return finding;

@@ -101,7 +101,7 @@ class FingerVerb final : public Verb {
         "frames: blue the scene's outline, green the one found); with --marker finger_tracks.csv. Prints how "
         "far it is "
         "from the scene's path",
-        "rhytid finger case.json -o run/finger\nrhytid finger case.json --marker dots.csv -o run/finger"};
+        "rhytid finger case.json --marker dots.csv -o run/finger"};
   }
   bool takes_case() const override { return true; }
   void add_options(CLI::App& app) override {
