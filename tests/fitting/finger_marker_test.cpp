@@ -5,11 +5,11 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <filesystem>
 #include <random>
 
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -269,7 +269,8 @@ TEST(FingerMarker, SaysWhenPointsDoNotAgreeOrDetermineNothing) {
 }
 
 TEST(FingerMarker, BadFilesAreOneLine) {
-  const auto file = (std::filesystem::temp_directory_path() / "rhytid_marker.csv").string();
+  const test::TemporaryFolder folder;
+  const std::string file = folder / "marker.csv";
   const auto message = [&](const std::string& text) -> std::string {
     write_file(file, text);
     try {
@@ -291,7 +292,6 @@ TEST(FingerMarker, BadFilesAreOneLine) {
   EXPECT_THAT(message(head + "a,-5,100,0,0,6\n"), HasSubstr(":2: got 'a' at -5, 100"));
   EXPECT_THAT(message(head + "a,100,100,0,0,6\nb,100,100,2,0,6\n"), HasSubstr(":3: got 'b' at 100, 100"));
   EXPECT_THAT(message(head), HasSubstr("got no landmark"));
-  std::filesystem::remove(file);
 }
 
 }  // namespace
