@@ -409,6 +409,8 @@ MinimiserOptions certificate_minimiser(const MinimiserOptions& from) {
   options.method = Minimiser::newton;
   options.relative_tolerance = std::min(options.relative_tolerance, 1e-10);
   options.certify_minimum = true;
+  // Slopes are taken down to rounding, which steps with a factor kept come less near to than Newton's last one does.
+  options.keep_factor = false;
   options.polish = true;
   return options;
 }

@@ -48,6 +48,8 @@ class Minimisation {
   /// Ends with newton() unless the method is literal.
   Status lbfgs();
   Status newton();
+  /// Steps of L-BFGS over the raw factor of Newton's last step, as long as they pay (kKeepWhile).
+  std::optional<Status> keep_factor(LbfgsMemory& memory);
   std::optional<Status> start();
   /// Makes `next` the current point; interrupted or nothing.
   std::optional<Status> accept(Iterate next);
@@ -226,6 +228,22 @@ bool Minimisation::leave_along_negative_curvature(Iterate& next) {
   return decreased;
 }
 
+std::optional<MinimiserStatus> Minimisation::keep_factor(LbfgsMemory& memory) {
+  while (!small() && report_.iterations < options_.max_iterations) {
+    const VectorXd direction = memory.descent_direction(at_.gradient, factor_);
+    const double slope = at_.gradient.dot(direction), before = report_.residual;
+    LineSearchResult found;
+    if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
+    report_.evaluations += found.evaluations;
+    if (!found.accepted) break;
+    memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);
+    ++report_.lbfgs_iterations;
+    if (const auto stop = accept(std::move(found.next))) return stop;
+    if (!(report_.residual <= kKeepWhile * before)) break;
+  }
+  return std::nullopt;
+}
+
 MinimiserStatus Minimisation::newton() {
   const bool always_projected = options_.method == Minimiser::newton_projected;
   const bool wants_raw = options_.certify_minimum || options_.polish;
@@ -278,8 +296,14 @@ MinimiserStatus Minimisation::newton() {
     }
     failures = 0;
     shift_ = kShift;
+    const bool keep = options_.keep_factor && raw && !always_projected && found.step == 1 &&
+                      found.next.gradient.norm() <= kKeepAfter * report_.residual;
+    LbfgsMemory memory(options_.lbfgs_memory);
+    if (keep) memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);
     if (const auto stop = accept(std::move(found.next))) return *stop;
     if (!small() && stagnates(slope, noise, raw ? kRawPatience : kPatience)) return Status::stagnated;
+    if (!keep) continue;
+    if (const auto stop = keep_factor(memory)) return *stop;
   }
 }
 

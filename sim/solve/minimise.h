@@ -14,7 +14,8 @@
 namespace rhytid {
 
 enum class Minimiser {
-  newton,  ///< raw Hessian; per-point projected one for two iterations when it is not positive definite
+  newton,  ///< raw Hessian; per-point projected one for two iterations when it is not positive definite; its factor
+           ///< is kept while steps with it converge fast (kKeepAfter)
   newton_projected,  ///< always projected (baseline)
   lbfgs,             ///< L-BFGS over a projected factor, then Newton for the certificate
   lbfgs_literal,     ///< L-BFGS to its end as published: no Newton, hence no certificate and no polish
@@ -33,6 +34,11 @@ inline constexpr double kMixedFromFlops = 2e9;
 inline constexpr double kDirectionTolerance = 1e-7;
 inline constexpr int kMaxCorrections = 12;
 
+/// After a step of Newton's that left at most kKeepAfter of the residual, the factor is kept for steps of L-BFGS as long as
+/// each leaves at most kKeepWhile of it: they cost an evaluation and a solve where a new Hessian and its factor cost several
+/// times that.
+inline constexpr double kKeepAfter = 0.1, kKeepWhile = 0.3;
+
 struct MinimiserOptions {
   Minimiser method = Minimiser::newton;
   /// Converged when |gradient|₂ ≤ relative_tolerance · force_scale + absolute_tolerance.
@@ -40,6 +46,7 @@ struct MinimiserOptions {
   double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;
   FactorPrecision precision = FactorPrecision::automatic;
+  bool keep_factor = true;  ///< of `newton`: see kKeepAfter
   int lbfgs_memory = 20;
   int lbfgs_refresh = 20;  ///< iterations between factorisations
   bool certify_minimum =
@@ -70,7 +77,7 @@ const char* name(MinimiserStatus status);
 struct MinimiserReport {
   MinimiserStatus status = MinimiserStatus::max_iterations;
   int iterations = 0;             ///< accepted steps, including those along negative curvature and the polish
-  int lbfgs_iterations = 0;       ///< of these, steps of L-BFGS
+  int lbfgs_iterations = 0;       ///< of these, steps of L-BFGS, also those of Newton's with a factor kept
   int evaluations = 0;            ///< of energy and gradient
   int factorisations = 0;         ///< including the failed ones
   int failed_factorisations = 0;  ///< not positive definite

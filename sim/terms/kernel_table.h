@@ -38,6 +38,9 @@ struct KernelTable {
   /// Stored energy of an element and its derivatives (PointKernel::stored).
   double (*stored)(const void* law, const ElementView&, const double* u, const double* s, double* u_bar,
                    double* s_bar, double* theta_bar) = nullptr;
+  /// True when det F certainly stays above 0 at every point on the way from u to u + d, by a bound that small steps
+  /// keep; prisms only, null for the others.
+  bool (*moves_freely)(const ElementView&, const double* u, const double* d) = nullptr;
   int num_stored = 0;
   const char* const* stored_names = nullptr;
   /// The history is nothing but what lags behind the step, so that a step may be solved again with its own

@@ -47,6 +47,10 @@ constexpr KernelTable kernel_table() {
   table.stored = [](const void* l, const ElementView& v, const double* u, const double* s, double* ub,
                     double* sb,
                     double* tb) { return K::stored(*static_cast<const Law*>(l), v, u, s, ub, sb, tb); };
+  if constexpr (Kin::rows == 3)
+    table.moves_freely = [](const ElementView& v, const double* u, const double* d) {
+      return moves_freely(v, u, d);
+    };
   table.num_stored = static_cast<int>(K::stored_names.size());
   table.stored_names = K::stored_names.data();
   table.history_is_lag = requires {

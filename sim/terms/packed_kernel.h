@@ -192,5 +192,43 @@ struct PackedKernel {
   }
 };
 
+/// Whether det(F + s D) = c0 + c1 s + c2 s² + c3 s³ certainly stays above 0 for s in [0, 1] at every point of a prism:
+/// c0 + min(0, c1) + min(0, c2) + min(0, c3) > 0. F = I + ∇u, D = ∇d, both finite.
+inline bool moves_freely(const ElementView& v, const double* u, const double* d) {
+  alignas(8 * kLanes) double of_u[9][kMaxPacked], of_d[9][kMaxPacked];
+  PackedSums sums(v);
+  sums.gather(u, of_u);
+  sums.gather(d, of_d);
+  for (int first = 0; first < v.num_points; first += kLanes) {
+    Lanes local[9], direction[9], jacobian[9], f[9], h[9];
+    for (int i = 0; i < 9; ++i) {
+      local[i] = load_lanes(of_u[i] + first);
+      direction[i] = load_lanes(of_d[i] + first);
+    }
+    load_points<9>(v.inverse_jacobian, sums.points() + first, jacobian);
+    PrismKinematics::to_point(local, jacobian, f);
+    PrismKinematics::to_point(direction, jacobian, h);
+    for (int i = 0; i < 9; i += 4) f[i] += 1.0;
+    // Cofactors of both, by rows: c1 = cof F : D, c2 = F : cof D.
+    Lanes c0 = {}, c1 = {}, c2 = {}, c3 = {};
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const int k = 3 * ((i + 1) % 3), l = 3 * ((i + 2) % 3), m = (j + 1) % 3, n = (j + 2) % 3;
+        const Lanes of_f = f[k + m] * f[l + n] - f[k + n] * f[l + m],
+                    of_h = h[k + m] * h[l + n] - h[k + n] * h[l + m];
+        if (i == 0) {
+          c0 += f[j] * of_f;
+          c3 += h[j] * of_h;
+        }
+        c1 += of_f * h[3 * i + j];
+        c2 += f[3 * i + j] * of_h;
+      }
+    const Lanes zero = {};
+    const Lanes least = c0 + (c1 < zero ? c1 : zero) + (c2 < zero ? c2 : zero) + (c3 < zero ? c3 : zero);
+    if (any_of(!(least > 0.0))) return false;
+  }
+  return true;
+}
+
 }  // namespace RHYTID_ISA
 }  // namespace rhytid

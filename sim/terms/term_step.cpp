@@ -156,13 +156,15 @@ double Term::feasible_step(const VectorXd& u, const VectorXd& d) const {
   const double unlimited = std::numeric_limits<double>::infinity();
   if (kernels_->rows != 3) return unlimited;
   double smallest = unlimited;
+  const std::vector<double> no_theta;
   for (const TermGroup& g : groups_) {
     std::vector<double> steps(g.num_elements, unlimited);
     parallel_for(g.num_elements, [&](std::int64_t k) {
       const int e = static_cast<int>(k);
       double h[9], dh[9];
-      const TermElement element{g, e, 0, {}};
+      const TermElement element = term_element(*kernels_, g, e, 0, no_theta);
       const NodalValues lu = element.gather(u), ld = element.gather(d);
+      if (kernels_->moves_freely(element.view, lu.data(), ld.data())) return;
       for (int q = 0; q < g.num_points; ++q) {
         displacement_gradient(g, e, q, lu.data(), h);
         displacement_gradient(g, e, q, ld.data(), dh);

@@ -68,10 +68,37 @@ TEST(Minimise, AllMinimisersFindTheEndOfTheValley) {
     if (method == Minimiser::lbfgs) {
       EXPECT_GT(report.lbfgs_iterations, 10);
       EXPECT_LT(report.factorisations, report.iterations / 5) << "a factor must serve many steps";
+    } else if (method == Minimiser::newton) {
+      EXPECT_GT(report.lbfgs_iterations, 0) << "the end of the valley converges fast";
+      EXPECT_LT(report.lbfgs_iterations, report.iterations / 2);
     } else {
       EXPECT_EQ(report.lbfgs_iterations, 0);
     }
   }
+}
+
+TEST(Minimise, AFactorIsKeptWhileThatConvergesFast) {
+  // A chain that is nearly quadratic: after its first step Newton would need a factor for each of the next.
+  RosenbrockChain kept_objective(12), fresh_objective(12);
+  const VectorXd start = VectorXd::Ones(36) + random_vector(36, 0, 0.02);
+  MinimiserOptions options;
+  const auto [kept, q, factor, matrix] = solve(kept_objective, start, options);
+  options.keep_factor = false;
+  const auto [fresh, p, fresh_factor, fresh_matrix] = solve(fresh_objective, start, options);
+  ASSERT_TRUE(kept.converged() && fresh.converged());
+  EXPECT_EQ(fresh.lbfgs_iterations, 0);
+  EXPECT_EQ(fresh.factorisations, fresh.iterations + 1);
+  EXPECT_GT(kept.lbfgs_iterations, 1);
+  EXPECT_EQ(kept.factorisations, kept.iterations - kept.lbfgs_iterations + 1)
+      << "and one for the certificate";
+  EXPECT_LT(kept.factorisations, fresh.factorisations);
+  EXPECT_EQ(kept.evaluations, kept_objective.evaluations);
+  EXPECT_LE((p - q).cwiseAbs().maxCoeff(), 1e-8);
+  // Each step with it but the last of a row left at most kKeepWhile of the residual.
+  int slow = 0;
+  for (std::size_t k = 1; k < kept.residuals.size(); ++k)
+    slow += kept.residuals[k] > kKeepWhile * kept.residuals[k - 1] ? 1 : 0;
+  EXPECT_LE(slow, kept.iterations - kept.lbfgs_iterations + 1);
 }
 
 TEST(Minimise, LiteralLbfgsGoesToItsEndAlone) {

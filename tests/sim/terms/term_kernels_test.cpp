@@ -132,6 +132,37 @@ TEST(TermKernels, ProductSumsAreTheSumsPointByPoint) {
   expect_product_sums_are_sums_by_points(volume_case(volume_table_baseline, 2, 2));
 }
 
+TEST(TermKernels, StepsEndWhereTheFirstPointCollapses) {
+  constexpr int kSamples = 400;
+  Rng rng(11);
+  int free = 0, limited = 0;
+  for (const PrismTables& tables : instruction_sets())
+    for (const auto& [p, q] : {std::pair{1, 1}, {2, 2}, {3, 3}, {4, 2}}) {
+      SCOPED_TRACE(tables.isa + ", p = " + std::to_string(p) + ", q = " + std::to_string(q));
+      const TermCase c =
+          skin_case(tables.elastic, false, DamperScheme::exponential, p, q, p == 4 ? 0.03 : 0.1);
+      for (const double amount : {0.01, 0.3, 1.0, 3.0}) {
+        const VectorXd d = smooth_displacement(c.mesh, rng, amount);
+        const double found = c.term().feasible_step(c.u, d);
+        int first = 0;
+        while (first <= kSamples && c.term().smallest_jacobian(c.u + first / double{kSamples} * d) > 0)
+          ++first;
+        if (std::isfinite(found)) {
+          ++limited;
+          EXPECT_NEAR(c.term().smallest_jacobian(c.u + found * d), 0, 1e-9);
+          EXPECT_GT(c.term().smallest_jacobian(c.u + 0.999 * found * d), 0);
+          EXPECT_GT(found * kSamples, first - 1);
+          EXPECT_LE(found * kSamples, first + 1e-9);
+        } else {
+          ++free;
+          EXPECT_GT(first, kSamples);
+        }
+      }
+    }
+  EXPECT_GT(free, 3);
+  EXPECT_GT(limited, 3);
+}
+
 TEST(TermKernels, TangentBlocksByOrder) {
   Rng rng(6);
   constexpr int D = kDirections;
