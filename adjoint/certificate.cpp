@@ -298,6 +298,7 @@ void Certification::error_bar() {
     begin("loosely converged run", static_cast<int>(run_.steps.size()));
     MinimiserOptions loose;
     loose.relative_tolerance = tolerance;
+    loose.keep_factor = false;
     const auto observe = [this](int, const StepProblem&, const State&) { return tick(); };
     const Trajectory run = resimulate(model_, native_, run_, loose, {}, observe, true);
     if (stopped_) throw Stopped{};

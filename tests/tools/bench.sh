@@ -81,6 +81,9 @@ expect 0 minimisers --nodes 600 --frames 4 -o "$folder/minimisers"
 [ "$(column "$folder/minimisers/minimisers.csv" outcome | grep -cx complete)" = 4 ] || fail "outcomes of minimisers"
 column "$folder/minimisers/minimisers.csv" largest_displacement_difference_mm |
   awk 'NR > 1 && !($1 > 0 && $1 < 1e-6) { bad = 1 } END { exit bad || NR != 4 }' || fail "minimisers differ"
+[ "$(column "$folder/minimisers/minimisers_frames.csv" frame | sort | uniq -c | tr -s ' ')" = "$(printf ' 4 %d\n' 1 2 3 4)" ] || fail "frames of minimisers"
+column "$folder/minimisers/minimisers_frames.csv" iterations | awk '{ n += $1 } END { print n }' >"$folder/sum"
+column "$folder/minimisers/minimisers.csv" iterations | awk '{ n += $1 } END { print n }' | cmp -s - "$folder/sum" || fail "iterations of frames"
 paste -d, <(column "$folder/minimisers/minimisers.csv" iterations) <(column "$folder/minimisers/minimisers.csv" factorisations) |
   awk -F, 'NR == 2 && !($2 >= $1) || NR != 2 && !($2 < $1) { exit 1 }' || fail "factorisations of minimisers"
 expect 0 minimisers --scene "$folder/stages/patch_600.json" --frames 2 --minimisers lbfgs_literal,newton --limit 0 --repeats 2 -o "$folder/limit"

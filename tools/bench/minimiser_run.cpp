@@ -1,6 +1,7 @@
 #include "tools/bench/minimiser_run.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "sim/output/text.h"
 #include "tools/bench/timing.h"
@@ -29,6 +30,8 @@ MinimiserRun run_minimiser(const SceneModel& scene_model, const MinimiserOptions
   bool out_of_time = false;
   (void)take_peak_memory();
   const double start = cpu_seconds();
+  double frame_start = start;
+  long iterations_before = 0;
   RunObserver observer;
   observer.iteration = [&](int, double, int, double, double residual) {
     result.gradient = residual;
@@ -45,7 +48,12 @@ MinimiserRun run_minimiser(const SceneModel& scene_model, const MinimiserOptions
     result.tolerance = report.tolerance;
     result.energy = report.energy;
     softened += event.record.softened ? 1 : 0;
-    if (event.frame_done && event.record.frame > 0) result.u.push_back(event.state.u);
+    if (!event.frame_done || event.record.frame == 0) return;
+    result.u.push_back(event.state.u);
+    const double now = cpu_seconds();
+    result.frame_seconds.push_back(now - std::exchange(frame_start, now));
+    result.frame_iterations.push_back(result.iterations -
+                                      std::exchange(iterations_before, result.iterations));
   };
   const Trajectory run = simulate(scene_model.model(), scene_model.native(), options, observer);
   result.seconds = cpu_seconds() - start;

@@ -19,7 +19,9 @@ struct MinimiserRun {
   bool complete = false;
   int frames = 0;  ///< reached
   long iterations = 0, evaluations = 0, factorisations = 0, failed_factorisations = 0;
-  double seconds = 0;  ///< CPU, of all threads
+  double seconds = 0;                 ///< CPU, of all threads
+  std::vector<double> frame_seconds;  ///< CPU, of frames 1, 2, ...; the first has what is set up once
+  std::vector<long> frame_iterations;
   double wall_seconds = 0;
   double peak_memory = 0;   ///< of the process, MB
   double gradient = 0;      ///< |gradient| at the end of the last step, N; of one given up, where it was left

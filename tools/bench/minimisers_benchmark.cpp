@@ -22,8 +22,12 @@ struct Compared {
   Minimiser method;
   MinimiserRun run;
   std::vector<double> seconds, wall_seconds;
+  std::vector<std::vector<double>> frame_seconds;  ///< [frame][repeat]
 
   void add(MinimiserRun next) {
+    frame_seconds.resize(std::max(frame_seconds.size(), next.frame_seconds.size()));
+    for (std::size_t f = 0; f < next.frame_seconds.size(); ++f)
+      frame_seconds[f].push_back(next.frame_seconds[f]);
     seconds.push_back(next.seconds);
     wall_seconds.push_back(next.wall_seconds);
     run = std::move(next);
@@ -56,7 +60,16 @@ class Tables {
               {"tolerance", "N"},
               {"largest_displacement_difference", "mm"},
               {"energy", "mJ"},
-              {"energy_difference", "mJ"}}) {}
+              {"energy_difference", "mJ"}}),
+        frames_csv_({{"scene", ""},
+                     {"nodes", ""},
+                     {"minimiser", ""},
+                     {"frame", ""},
+                     {"iterations", ""},
+                     {"cpu", "s"},
+                     {"cpu_over_first", ""},
+                     {"least_ratio", ""},
+                     {"largest_ratio", ""}}) {}
 
   void add(const std::string& scene, int nodes, const Compared& c, const Compared& first) {
     const MinimiserRun& run = c.run;
@@ -75,6 +88,7 @@ class Tables {
     const auto shown = [](const char* format, double value) {
       return std::isfinite(value) ? formatted(format, value) : std::string("-");
     };
+    for (std::size_t f = 0; f < run.frame_seconds.size(); ++f) add_frame(scene, nodes, c, first, f);
     markdown_ += "| " + scene + " | " + name(c.method) + " | " + outcome + " | " +
                  std::to_string(run.iterations) + " | " + std::to_string(run.factorisations) + " (" +
                  std::to_string(run.failed_factorisations) + ") | " + std::to_string(run.evaluations) +
@@ -91,11 +105,26 @@ class Tables {
   }
   void write(const std::string& folder) const {
     csv_.write(folder + "/minimisers.csv");
+    frames_csv_.write(folder + "/minimisers_frames.csv");
     write_file(folder + "/minimisers.md", markdown());
   }
 
  private:
-  CsvTable csv_;
+  /// Ratios are those of the runs of one round, which followed each other.
+  void add_frame(const std::string& scene, int nodes, const Compared& c, const Compared& first,
+                 std::size_t f) {
+    std::vector<double> ratios;
+    if (f < first.frame_seconds.size())
+      for (std::size_t k = 0; k < std::min(c.frame_seconds[f].size(), first.frame_seconds[f].size()); ++k)
+        ratios.push_back(c.frame_seconds[f][k] / first.frame_seconds[f][k]);
+    const auto [least, largest] = std::minmax_element(ratios.begin(), ratios.end());
+    frames_csv_.add_row({scene, std::int64_t{nodes}, std::string(name(c.method)),
+                         static_cast<std::int64_t>(f) + 1, std::int64_t{c.run.frame_iterations[f]},
+                         median(c.frame_seconds[f]), ratios.empty() ? NAN : median(ratios),
+                         ratios.empty() ? NAN : *least, ratios.empty() ? NAN : *largest});
+  }
+
+  CsvTable csv_, frames_csv_;
   std::string markdown_;
 };
 
@@ -114,8 +143,8 @@ class MinimisersBenchmark : public Benchmark {
         "seconds of all threads (medians). Ours go by factors in single precision where the scene's "
         "/solver/factor_precision has it so, the publication's never. Its own tolerance of the publication "
         "is --set "
-        "/solver/relative_tolerance=0 --set /solver/absolute_tolerance=1e-6. Writes minimisers.csv and "
-        "minimisers.md into -o DIR."};
+        "/solver/relative_tolerance=0 --set /solver/absolute_tolerance=1e-6. Writes minimisers.csv, "
+        "minimisers_frames.csv (each frame by itself) and minimisers.md into -o DIR."};
   }
   void add_options(CLI::App& app) override {
     scenes_.add_options(app);
@@ -146,7 +175,7 @@ class MinimisersBenchmark : public Benchmark {
       std::vector<Compared> all;
       for (int round = 0; round < rounds; ++round) {
         const std::size_t k = static_cast<std::size_t>(round) % methods.size();
-        if (round < static_cast<int>(methods.size())) all.push_back({methods[k], {}, {}, {}});
+        if (round < static_cast<int>(methods.size())) all.push_back({methods[k], {}, {}, {}, {}});
         all[k].add(run_minimiser(scene_model,
                                  minimiser_to_compare(methods[k], scene_model.run_options().minimiser),
                                  limit_, [&] { return !context.progress.interrupted(); }));
