@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <opencv2/imgproc.hpp>
 
+#include "sim/output/atomic_file.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/bench/filming.h"
 
 namespace rhytid::tools {
@@ -27,11 +28,12 @@ TrackingScore score(const std::string& name, int frames = 8) {
   fitting::TrackerOptions options;
   options.seeds.min_distance_px = 12;
   options.seeds.max_tracks = 60;
-  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-  const auto folder =
-      std::filesystem::temp_directory_path() / (std::string("rhytid_filming_") + test->name() + name);
-  const TrackingScore s = score_filming(*speckle(frames), filming(name), options, 4, folder.string());
-  EXPECT_FALSE(std::filesystem::exists(folder));
+  // What lies in the folder stays, and nothing of the film does.
+  const test::TemporaryFolder folder;
+  write_file(folder / "film", "mine");
+  const TrackingScore s = score_filming(*speckle(frames), filming(name), options, 4, folder.path());
+  EXPECT_EQ(folder.num_files(), 1u);
+  EXPECT_EQ(read_file(folder / "film"), "mine");
   std::printf("%s: kept %.2f, rms %.4f px, sigma %.4f px, normalised %.2f, gross %d, jitter %.4f, %s\n",
               name.c_str(), s.kept, s.rms_px, s.sigma_px, s.normalised, s.gross, s.jitter_px,
               refusals_text(s).c_str());

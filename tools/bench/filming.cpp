@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
@@ -75,11 +76,29 @@ cv::Mat rounded(const cv::Mat& levels, double noise, std::mt19937* random) {
   return out;
 }
 
+/// A new folder in `parent` for one film, removed however its use ends.
+class FilmFolder {
+ public:
+  explicit FilmFolder(const std::string& parent) : path_(parent + "/film-XXXXXX") {
+    fs::create_directories(parent);
+    if (!mkdtemp(path_.data())) throw InputError(parent, "no new folder in it", "a writable folder");
+  }
+  ~FilmFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  FilmFolder(const FilmFolder&) = delete;
+  FilmFolder& operator=(const FilmFolder&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 /// Films and says where.
 fitting::FrameSourceOptions film(const FilmedSkin& skin, const Filming& filming, unsigned seed,
                                  const std::string& folder) {
   constexpr double kRate = 25;
-  fs::create_directories(folder);
   std::mt19937 random(seed);
   fitting::FrameSourceOptions options;
   options.path = folder + (filming.h264 ? "/film.mp4" : "/f_%03d.png");
@@ -198,9 +217,9 @@ TrackingScore score_filming(const FilmedSkin& skin, const Filming& filming, fitt
       return other ? cv::Mat(mask | other(frame)) : mask;
     };
   }
-  fitting::FrameSource source(film(skin, filming, seed, folder));
+  const FilmFolder film_folder(folder);
+  fitting::FrameSource source(film(skin, filming, seed, film_folder.path()));
   const fitting::TrackerResult result = fitting::track(source, options);
-  fs::remove_all(folder);
   score.started = result.report.started;
   score.kept = static_cast<double>(result.report.kept) / result.report.started;
   score.refusals = result.report.refusals;

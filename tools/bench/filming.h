@@ -58,7 +58,7 @@ struct TrackingScore {
   int template_updates = 0, redetected = 0;
 };
 
-/// Films into `folder` (stills, removed afterwards, or a video), tracks with `options` (seeds and masks are set here)
+/// Films into a new folder in `folder` (stills or a video, removed afterwards), tracks with `options` (seeds and masks are set here)
 /// and compares with the truth. Throws InputError.
 TrackingScore score_filming(const FilmedSkin& skin, const Filming& filming, fitting::TrackerOptions options,
                             unsigned seed, const std::string& folder);

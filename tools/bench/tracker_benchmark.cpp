@@ -134,17 +134,22 @@ class TrackerBenchmark : public Benchmark {
                 names + "."};
   }
   void add_options(CLI::App& app) override {
-    app.add_option("case", case_,
-                   "a case whose truth is filmed too, e.g. data/scenes/recovery_swipe/case.json")
-        ->option_text("CASE");
+    CLI::Option* of_case =
+        app.add_option("case", case_,
+                       "a case whose truth is filmed too, e.g. data/scenes/recovery_swipe/case.json")
+            ->option_text("CASE");
     app.add_option("--set", settings_, "change one value of the case; may be repeated")
+        ->needs(of_case)
         ->option_text("/POINTER=VALUE")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    app.add_option("--picture", picture_, "a picture or video with a face; a frame of it is a texture too");
+    CLI::Option* picture = app.add_option("--picture", picture_,
+                                          "a picture or video with a face; a frame of it is a texture too");
     app.add_option("--picture-frame", picture_frame_, "which frame (default 0)")
+        ->needs(picture)
         ->check(CLI::Range(0, 1000000));
     app.add_option("--picture-region", region_, "where its points are followed, px (default: the middle)")
+        ->needs(picture)
         ->option_text("X,Y,WIDTH,HEIGHT")
         ->delimiter(',')
         ->expected(4);
@@ -156,6 +161,7 @@ class TrackerBenchmark : public Benchmark {
   }
 
   ExitCode run(VerbContext& context, const std::string& folder) override {
+    if (window_ % 2 == 0) throw InputError("--window", std::to_string(window_), "an odd number of pixels");
     cv::setNumThreads(context.options.threads);
     const std::vector<Filming> wanted = wanted_filmings();
     std::vector<NamedSkin> skins;
@@ -168,7 +174,7 @@ class TrackerBenchmark : public Benchmark {
         options.window_px = window_;
         options.seeds.min_distance_px = 10;
         options.seeds.max_tracks = 120;
-        scores.push_back(score_filming(*s.skin, filming, options, seed_, folder + "/film"));
+        scores.push_back(score_filming(*s.skin, filming, options, seed_, folder));
         scores.back().skin = s.name;
         context.progress.step_done(static_cast<int>(scores.size()));
         write_csv(folder + "/tracker.csv", scores);
