@@ -91,6 +91,13 @@ double FunctionalDifference::difference(const Trajectory& other) const {
   return sum;
 }
 
+double FunctionalDifference::rounding() const {
+  double sum = 0;
+  for (int f = 0; f <= run_->frames(); ++f)
+    if (output_->size(f) > 0) sum += (*weights_)[f].cwiseAbs().dot(values_[f].cwiseAbs());
+  return std::numeric_limits<double>::epsilon() * sum;
+}
+
 FunctionalDifference::Result FunctionalDifference::evaluate(const VectorXd& native, const StartGuess& guess,
                                                             const std::function<bool()>& go_on) const {
   Result result;
@@ -125,8 +132,8 @@ double measure_noise(const FunctionalDifference& functional, const ParameterSpac
     noise[k] = std::fabs(whole.difference - 2 * half.difference);
   }
   std::sort(noise.begin(), noise.end());
-  // Runs that a step does not change can have the same bits; one that differs then says more than two that do not.
-  return noise[1] > 0 ? noise[1] : noise[2];
+  // Runs that a step does not change can have the same bits, which says nothing of those that it does.
+  return noise[1] > 0 ? noise[1] : std::max(noise[2], functional.rounding());
 }
 
 TaylorSeries taylor_test(const FunctionalDifference& functional, const ParameterSpace& space,

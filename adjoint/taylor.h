@@ -68,6 +68,9 @@ class FunctionalDifference {
   /// the nominal one.
   double difference(const Trajectory& other) const;
 
+  /// What the last digits of the outputs are worth in Q: ε Σ |w| |outputs|, the finest that Q can be told from itself.
+  double rounding() const;
+
   const Trajectory& run() const { return *run_; }
   const Model& model() const { return scene_model_->model(); }
   /// Pieces of every step at the nominal run.
@@ -84,7 +87,8 @@ class FunctionalDifference {
 };
 
 /// Rounding and solver noise of Q, measured near x = 0 along `direction`: |Q(h v) − 2 Q(h v/2) + Q(0)| at a
-/// step h so small that nothing else is left, the middle one of three. Does not use a gradient. Six evaluations.
+/// step h so small that nothing else is left, the middle one of three; rounding() where two of them have the same bits. Does not use a
+/// gradient. Six evaluations.
 double measure_noise(const FunctionalDifference& functional, const ParameterSpace& space,
                      const VectorXd& direction, const std::function<bool()>& go_on = {});
 

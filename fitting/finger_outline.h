@@ -16,8 +16,8 @@
 //   Cov(c) = 1/5 Σ_b (c_b − c)(c_b − c)ᵀ,   c_b the fit without b, over all blocks b of 5 neighbours
 // A jackknife, by blocks because neighbours err alike. Each c_b has weights of its own, v w: w Tukey's, whose cut comes from
 // the residuals, v = min(1, (g/usual g)²), since a faint edge is less sure. A linearised variance at fixed weights is half
-// of that where few edges carry the fit: they pull it towards themselves, and the cut gives way to them. This holds what samples scatter, not what all err alike: a finger that is no sphere, a wrong
-// radius or camera. Size tells depth: a radius wrong by one per cent moves the centre by one per cent of its distance.
+// of that where few edges carry the fit: they pull it towards themselves, and the cut gives way to them. This holds what
+// samples scatter, not what all err alike: a finger that is no sphere, a wrong radius or camera. Size tells depth: a radius wrong by one per cent moves the centre by one per cent of its distance.
 //
 // Source  Harris and Stennett 1990 (RAPID); Armstrong and Zisserman 1995 (robust); Künsch 1989 (blocks).   Units  px, mm.
 // Tests   tests/fitting/finger_outline_test.cpp

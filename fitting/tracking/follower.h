@@ -53,7 +53,7 @@ struct Measurement {
 Measurement measure(const Follower& follower, const FlowGuess& guess, const Eigen::Matrix2d& held,
                     const FrameView& view, const TrackerOptions& options);
 
-/// The deformation since its template was cut that the follower's neighbours tell by how they moved, for windows whose
+/// The deformation since its template was cut that the follower and its seven nearest neighbours tell by how they moved, for windows whose
 /// texture does not; its own last one where neighbours are few or contradict it.
 Eigen::Matrix2d held_gradient(const std::vector<Follower>& followers, const Follower& follower);
 
@@ -82,7 +82,8 @@ void accept(const Measurement& measurement, const ResidualCorrelation& correlati
 double covered_fraction(const cv::Mat& mask, const Vec2& pixel, int half);
 
 /// Where neighbours in the first frame say that a point of it is now: weighted affine fit of their motion.
-/// Returns nothing when fewer than three neighbours are active.
-std::optional<PatchWarp> expected_from_neighbours(const std::vector<Follower>& followers, const Vec2& seed);
+/// Returns nothing when fewer than `fewest` are active, itself counted if it is.
+std::optional<PatchWarp> expected_from_neighbours(const std::vector<Follower>& followers, const Vec2& seed,
+                                                  std::size_t fewest = 3);
 
 }  // namespace rhytid::fitting

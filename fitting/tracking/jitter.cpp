@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <set>
+#include <string>
 #include <utility>
 
 namespace rhytid::fitting {
@@ -85,9 +87,9 @@ double median_ratio(const std::vector<Jump>& jumps, double variance) {
 double measure_jitter(const TrackSet& tracks) {
   constexpr std::size_t kFewest = 50, kFewestInFrame = 9;
   std::vector<Jump> jumps;
-  std::map<std::string, bool> cameras;
-  for (const Track& t : tracks.tracks) cameras[t.camera] = true;
-  for (const auto& [camera, unused] : cameras)
+  std::set<std::string> cameras;
+  for (const Track& t : tracks.tracks) cameras.insert(t.camera);
+  for (const std::string& camera : cameras)
     for (const auto& [frame, bends] : bends_of(tracks, camera))
       for (std::size_t i = 0; bends.size() >= kFewestInFrame && i < bends.size(); ++i)
         jumps.push_back(jump_of(bends, i));

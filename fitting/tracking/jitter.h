@@ -7,8 +7,8 @@
 //   E|d|² = tr(V_if) + 2 k_if s²,   V of the stated covariances, k_if = 6 (1 + Σ_n l_n²), l the weights of the fit
 //
 // Accelerations of the skin that are affine over some 20 px drop out. s² is what brings the median of |d|²/(tr V + 2 k s²)
-// to that of two Gaussian numbers, ln 2: half of the jumps may be wrong, which a twentieth of the tracks makes so. Accelerations that are not affine (an edge of
-// a sliding contact) count as jitter, which is on the safe side.
+// to that of two Gaussian numbers, ln 2: half of the jumps may be wrong, which a twentieth of the tracks makes so.
+// Accelerations that are not affine (an edge of a sliding contact) count as jitter, which is on the safe side.
 //
 // Units  px.   Tests  tests/fitting/tracking/jitter_test.cpp
 #pragma once

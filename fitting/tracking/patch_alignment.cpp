@@ -15,6 +15,8 @@ constexpr int kMost = 10;
 /// The ramp is fitted when it takes a third of the squared residual (a fifth of the residual): in windows of little
 /// texture it is hard to tell from the position, and real faces drift further with a lower threshold.
 constexpr double kRampTakes = 1 - 1 / (1.25 * 1.25);
+/// Variance of the noise over that of its residuals, at most.
+constexpr double kMostLost = 2;
 /// At the rim of a window, over its mean: soft shadows reach 0.08, the edge of a finger 0.2.
 constexpr double kSteepestRamp = 0.1;
 
@@ -344,10 +346,15 @@ ResidualCorrelation::ResidualCorrelation(const std::vector<const Alignment*>& al
     Lags whole = raw;
     for (int dy = 0; dy <= kReach; ++dy)
       for (int dx = -kReach; dx <= kReach; ++dx) whole[dy][dx + kReach] += variance_ * lost[dy][dx + kReach];
-    // More than half of the variance lost to the fit: the residuals say nothing about such noise.
-    if (!(whole[0][kReach] < 2 * raw[0][kReach])) break;
+    // More than half of the variance lost to the fit: the residuals say nothing about such noise but that it is much.
+    if (!(whole[0][kReach] < kMostLost * raw[0][kReach])) {
+      variance_ = kMostLost * raw[0][kReach];
+      break;
+    }
     take(whole);
   }
+  // Residuals and the number of unknowns alone say 1.
+  variance_ = std::max(1.0, variance_);
 }
 
 void ResidualCorrelation::take(const Lags& covariance) {
@@ -370,7 +377,9 @@ ResidualCorrelation::Lags ResidualCorrelation::taken_by_fit(
     const int side = static_cast<int>(std::lround(std::sqrt(static_cast<double>(n))));
     // J' = L⁻¹ J with L Lᵀ = J Jᵀ (rows are parameters): then H = J'ᵀ J'.
     const MatrixXd full = a->jacobian.cast<double>();
-    const MatrixXd J = Eigen::LLT<MatrixXd>(full * full.transpose()).matrixL().solve(full);
+    const Eigen::LLT<MatrixXd> factor(full * full.transpose());
+    if (factor.info() != Eigen::Success) continue;
+    const MatrixXd J = factor.matrixL().solve(full);
     MatrixXd K = MatrixXd::Zero(J.rows(), n);  // J' Σ
     for (int dy = -kReach; dy <= kReach; ++dy)
       for (int dx = -kReach; dx <= kReach; ++dx) {

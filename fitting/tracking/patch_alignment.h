@@ -96,8 +96,8 @@ class ResidualCorrelation {
 
   /// ρ at lag (dx, dy), 0 <= dy <= reach, |dx| <= reach.
   double at(int dx, int dy) const { return rho_[dy][dx + kReach]; }
-  /// Variance of the noise over that of the residuals, σ²: above 1, since correlated noise that the fitted warp
-  /// and light follow is not in the residuals.
+  /// Variance of the noise over that of the residuals, σ²: 1 to 2, since correlated noise that the fitted warp
+  /// and light follow is not in the residuals; where they follow more than half of it, 2.
   double variance_ratio() const { return variance_; }
 
  private:

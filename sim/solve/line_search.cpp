@@ -29,13 +29,13 @@ double energy_noise(const Objective& objective, const Iterate& at) {
   return 1e-11 * std::abs(at.energy) + 1e-15 * objective.force_scale() * at.q.cwiseAbs().maxCoeff();
 }
 
-LineSearchResult line_search(Objective& objective, const Iterate& at, const VectorXd& direction,
-                             double slope) {
+LineSearchResult line_search(Objective& objective, const Iterate& at, const VectorXd& direction, double slope,
+                             int most_trials) {
   LineSearchResult result;
   const double noise = energy_noise(objective, at);
   const double first = std::min(1.0, 0.9 * objective.largest_feasible_step(at.q, direction));
   // Not `while (step >= ...)` alone: a first step of zero or NaN must end here too.
-  for (double step = first; step > 0 && step >= kSmallestStep * first;) {
+  for (double step = first; step > 0 && step >= kSmallestStep * first && result.evaluations < most_trials;) {
     result.next = evaluate(objective, at.q + step * direction);
     ++result.evaluations;
     result.step = step;

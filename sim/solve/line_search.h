@@ -1,6 +1,8 @@
 // Backtracking along a descent direction. Internal to sim/solve.
 #pragma once
 
+#include <limits>
+
 #include "sim/solve/objective.h"
 
 namespace rhytid {
@@ -31,8 +33,9 @@ struct LineSearchResult {
 /// rounding may hide that decrease, E(a) ≤ E + noise, the gradient decides: accepted by the approximate Wolfe
 /// test (Hager and Zhang 2005) 0.9 slope ≤ slope(a) ≤ (2e-4 − 1) slope, or when its norm has halved.
 /// Non-finite trials shorten the step by 0.3, others by quadratic interpolation within [0.1, 0.5].
-LineSearchResult line_search(Objective& objective, const Iterate& at, const VectorXd& direction,
-                             double slope);
+/// Gives up after `most_trials`.
+LineSearchResult line_search(Objective& objective, const Iterate& at, const VectorXd& direction, double slope,
+                             int most_trials = std::numeric_limits<int>::max());
 
 /// Doubles an accepted step while at its end the energy still falls at least at 0.7 of the first rate. The
 /// direction of a projected Hessian can be a hundred times too short where the true curvature is small or

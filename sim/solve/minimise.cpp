@@ -233,7 +233,9 @@ std::optional<MinimiserStatus> Minimisation::keep_factor(LbfgsMemory& memory) {
     const VectorXd direction = memory.descent_direction(at_.gradient, factor_);
     const double slope = at_.gradient.dot(direction), before = report_.residual;
     LineSearchResult found;
-    if (slope < 0 && direction.allFinite()) found = line_search(objective_, at_, direction, slope);
+    // One trial: a direction that needs shortening is not worth what a new factor gives.
+    if (slope < 0 && direction.allFinite())
+      found = line_search(objective_, at_, direction, slope, /*most_trials=*/1);
     report_.evaluations += found.evaluations;
     if (!found.accepted) break;
     memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);
@@ -296,7 +298,7 @@ MinimiserStatus Minimisation::newton() {
     }
     failures = 0;
     shift_ = kShift;
-    const bool keep = options_.keep_factor && raw && !always_projected && found.step == 1 &&
+    const bool keep = options_.keep_factor && raw && found.step == 1 &&
                       found.next.gradient.norm() <= kKeepAfter * report_.residual;
     LbfgsMemory memory(options_.lbfgs_memory);
     if (keep) memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);

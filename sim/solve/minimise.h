@@ -35,7 +35,7 @@ inline constexpr double kDirectionTolerance = 1e-7;
 inline constexpr int kMaxCorrections = 12;
 
 /// After a step of Newton's that left at most kKeepAfter of the residual, the factor is kept for steps of L-BFGS as long as
-/// each leaves at most kKeepWhile of it: they cost an evaluation and a solve where a new Hessian and its factor cost several
+/// each leaves at most kKeepWhile of it, at the first trial: they cost an evaluation and a solve where a new Hessian and its factor cost several
 /// times that.
 inline constexpr double kKeepAfter = 0.1, kKeepWhile = 0.3;
 
@@ -46,7 +46,7 @@ struct MinimiserOptions {
   double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;
   FactorPrecision precision = FactorPrecision::automatic;
-  bool keep_factor = true;  ///< of `newton`: see kKeepAfter
+  bool keep_factor = true;  ///< of `newton`: see kKeepAfter; such steps count as iterations too
   int lbfgs_memory = 20;
   int lbfgs_refresh = 20;  ///< iterations between factorisations
   bool certify_minimum =

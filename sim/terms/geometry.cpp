@@ -19,7 +19,8 @@ ProductTables product_tables(const TriangleBasis& triangle, const LineBasis& lin
   t.padded_plane_nodes = (t.plane_nodes + 7) / 8 * 8;
   t.line_nodes = line.num_nodes();
   t.line_points = rule.line_points;
-  require(t.line_points <= kMaxLinePoints && t.line_nodes <= kLineStride, "prism_group: too many points");
+  require(t.line_points <= kMaxLinePoints && t.line_nodes <= ProductView::kMaxLineNodes,
+          "prism_group: too many points");
   const std::size_t padded = static_cast<std::size_t>(t.padded_plane_nodes),
                     plane_points = rule.points.size() / static_cast<std::size_t>(t.line_points);
   t.plane.resize(plane_points * 3 * padded);

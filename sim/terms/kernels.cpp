@@ -22,7 +22,7 @@ namespace {
 
 enum class InstructionSet { baseline, avx2, avx512 };
 
-/// The one of that name if this build and the processor have it, else the portable one; the best for an empty name.
+/// The one of that name, or the best below it that this build and the processor have; the best for an empty name.
 InstructionSet available(std::string_view wish) {
 #ifdef RHYTID_HAVE_AVX512
   if ((wish.empty() || wish == "avx512") && __builtin_cpu_supports("avx512f") &&
@@ -30,7 +30,7 @@ InstructionSet available(std::string_view wish) {
     return InstructionSet::avx512;
 #endif
 #ifdef RHYTID_HAVE_AVX2
-  if ((wish.empty() || wish == "avx2") && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+  if (wish != "baseline" && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
     return InstructionSet::avx2;
 #endif
   (void)wish;

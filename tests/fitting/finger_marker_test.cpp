@@ -9,6 +9,7 @@
 
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
+#include "tests/fitting/finger_camera.h"
 #include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
@@ -17,18 +18,6 @@ namespace {
 using testing::HasSubstr;
 
 constexpr int kFrames = 7;
-
-Camera test_camera() {
-  Camera camera;
-  camera.intrinsics << 926, 0, 322, 0, 921, 241, 0, 0, 1;
-  camera.distortion = {-0.12, 0.05, 0.001, -0.002, 0};
-  camera.rotation =
-      (Eigen::AngleAxisd(2.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.2, Vec3::UnitY())).toRotationMatrix();
-  camera.translation = {0.5, -1, 52};
-  camera.width = 640;
-  camera.height = 480;
-  return camera;
-}
 
 /// Moves by 4 mm and turns by `turn` rad.
 std::vector<BodyPose> path(double turn) {
@@ -58,7 +47,7 @@ Footage footage(const std::vector<BodyPose>& poses, int count, unsigned seed, co
     const double x = normal(random);
     return Vec2(sigma * x, sigma * normal(random));
   };
-  const Camera camera = test_camera();
+  const Camera camera = finger_camera();
   const Vec3 toward = (camera.centre() - poses[0].centre).normalized(), side = toward.unitOrthogonal(),
              third = toward.cross(side);
   Footage made;
@@ -97,7 +86,7 @@ constexpr MarkerOptions kPlain{.floor = 0.001, .huber = 0};
 
 MarkerMotion followed(const Footage& made, const std::vector<BodyPose>& of_scene,
                       const MarkerOptions& options = kPlain) {
-  return follow_marker(made.tracks, made.marker, test_camera(), of_scene, options, "dots.csv");
+  return follow_marker(made.tracks, made.marker, finger_camera(), of_scene, options, "dots.csv");
 }
 
 /// The scene's path is known to a millimetre or so.
@@ -182,7 +171,7 @@ TEST(FingerMarker, OnePointNeedsTheDepthOfTheScene) {
   }
   MarkerOptions options = kPlain;
   options.depth_of_scene = true;
-  const Camera camera = test_camera();
+  const Camera camera = finger_camera();
   const Vec3 across = camera.rotation.transpose() * Vec3(2, -1, 0);  // off, but at the right depth
   const MarkerMotion motion = followed(made, shifted(truth, across), options);
   for (std::size_t f = 0; f < truth.size(); ++f)

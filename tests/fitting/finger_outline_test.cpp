@@ -10,23 +10,12 @@
 #include <random>
 
 #include "sim/core/error.h"
+#include "tests/fitting/finger_camera.h"
 
 namespace rhytid::fitting {
 namespace {
 
 constexpr double kRadius = 6;
-
-Camera test_camera() {
-  Camera camera;
-  camera.intrinsics << 926, 0, 322, 0, 921, 241, 0, 0, 1;
-  camera.distortion = {-0.12, 0.05, 0.001, -0.002, 0};
-  camera.rotation =
-      (Eigen::AngleAxisd(2.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.2, Vec3::UnitY())).toRotationMatrix();
-  camera.translation = {0.5, -1, 52};
-  camera.width = 640;
-  camera.height = 480;
-  return camera;
-}
 
 /// Smooth random grey of a typical size, about 0 with a deviation of 1.
 cv::Mat texture(std::mt19937& random, double size) {
@@ -82,7 +71,7 @@ std::pair<double, double> split(const Camera& camera, const Vec3& centre, const 
 }
 
 TEST(SphereOutline, LiesWhereLinesOfSightTouch) {
-  const Camera camera = test_camera();
+  const Camera camera = finger_camera();
   const Vec3 centre(0.7, -1.2, 5);
   for (const OutlinePoint& p : sphere_outline(centre, kRadius, camera, 40)) {
     const OutlineResidual e = outline_residual(camera.pixel_ray(p.pixel), centre, kRadius, p.px_per_mm);
@@ -97,7 +86,7 @@ TEST(SphereOutline, LiesWhereLinesOfSightTouch) {
 }
 
 TEST(OutlineResidual, DerivativeIsThatOfTheValue) {
-  const Camera camera = test_camera();
+  const Camera camera = finger_camera();
   const Vec3 centre(0.7, -1.2, 5);
   const Ray ray = camera.pixel_ray({250, 300});
   const OutlineResidual at = outline_residual(ray, centre, kRadius, 17);
@@ -115,7 +104,7 @@ TEST(OutlineResidual, DerivativeIsThatOfTheValue) {
 }
 
 TEST(FindSphere, RecoversTheCentreAndStatesItsError) {
-  const Camera camera = test_camera();
+  const Camera camera = finger_camera();
   std::mt19937 random(7);
   std::uniform_real_distribution<double> uniform(-1, 1);
   constexpr int kDraws = 40;
@@ -145,7 +134,7 @@ TEST(FindSphere, RecoversTheCentreAndStatesItsError) {
 }
 
 TEST(FindSphere, AHiddenThirdWidensTheErrorAndIsLeftOut) {
-  const Camera camera = test_camera();
+  const Camera camera = finger_camera();
   const Vec3 centre(0.4, -0.8, 5), start = centre + Vec3(0.3, -0.3, 0.2);
   const OutlineEstimate whole = find_sphere(picture_of(camera, centre, 3), camera, start, kRadius);
   const OutlineEstimate part = find_sphere(
@@ -162,7 +151,7 @@ TEST(FindSphere, AHiddenThirdWidensTheErrorAndIsLeftOut) {
 }
 
 TEST(FindSphere, SaysWhatItCannotFind) {
-  const Camera camera = test_camera();
+  const Camera camera = finger_camera();
   const Vec3 centre(0.4, -0.8, 5);
   const cv::Mat picture = picture_of(camera, centre, 5);
   EXPECT_NE(find_sphere(picture, camera, centre + Vec3(3, 0, 0), kRadius).lost, "");  // 50 px away

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "sim/core/error.h"
+#include "tests/tools/program_call.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -36,21 +37,9 @@ class Probe : public Verb {
   int depth_ = 0;
 };
 
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
 Outcome run(
     const std::vector<std::string>& arguments, Probe::Work work = [](VerbContext&) { return ExitCode::ok; }) {
-  Program program;
-  program.name = "rhytid";
-  program.verbs.push_back(std::make_unique<Probe>(std::move(work)));
-  std::vector<const char*> argv = {"rhytid"};
-  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
-  std::ostringstream out, err;
-  const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-  return {code, out.str(), err.str()};
+  return call_program(arguments, std::make_unique<Probe>(std::move(work)));
 }
 
 Outcome run_throwing(const std::function<void()>& thrower) {

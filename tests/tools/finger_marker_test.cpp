@@ -1,13 +1,11 @@
 // `rhytid finger --marker` end to end: a finger with dots is rendered, and found from a millimetre beside it.
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "fitting/landmarks.h"
 #include "sim/core/error.h"
@@ -16,6 +14,8 @@
 #include "sim/scene/collider_motion.h"
 #include "sim/scene/load.h"
 #include "sim/scene/read_path.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/tools/program_call.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -50,30 +50,13 @@ std::string scene_text(const Vec3& shift, double turn, const std::string& shape 
 })";
 }
 
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
 Outcome call(const std::vector<std::string>& arguments) {
-  Program program{"rhytid", "test", {}, {}};
-  program.verbs.push_back(make_verb_render());
-  program.verbs.push_back(make_verb_finger());
-  std::vector<const char*> argv = {"rhytid"};
-  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
-  std::ostringstream out, err;
-  const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-  return {code, out.str(), err.str()};
+  return call_program(arguments, make_verb_render(), make_verb_finger());
 }
 
 class FingerByMarker : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("rhytid_marker_" + std::to_string(getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return folder_ / name; }
 
   void render(double turn) const {
     write_file(path("truth.json"), scene_text(Vec3::Zero(), turn));
@@ -137,7 +120,7 @@ class FingerByMarker : public testing::Test {
   }
 
  private:
-  fs::path folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(FingerByMarker, DotsTellWhereAFingerIsAndHowItTurns) {

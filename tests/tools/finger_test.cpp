@@ -1,12 +1,10 @@
 // `rhytid finger` end to end: footage is rendered, the path is looked for from half a millimetre beside it.
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "fitting/cameras.h"
 #include "sim/output/atomic_file.h"
@@ -14,6 +12,8 @@
 #include "sim/scene/load.h"
 #include "sim/scene/read_path.h"
 #include "tests/support/paths.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/tools/program_call.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -53,30 +53,13 @@ std::string path_setting(const Scene& scene, const Vec3& shift) {
   return "/colliders/finger/path=" + path.dump();
 }
 
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
 Outcome call(const std::vector<std::string>& arguments) {
-  Program program{"rhytid", "test", {}, {}};
-  program.verbs.push_back(make_verb_render());
-  program.verbs.push_back(make_verb_finger());
-  std::vector<const char*> argv = {"rhytid"};
-  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
-  std::ostringstream out, err;
-  const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-  return {code, out.str(), err.str()};
+  return call_program(arguments, make_verb_render(), make_verb_finger());
 }
 
 class Finger : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("rhytid_finger_" + std::to_string(getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return folder_ / name; }
 
   /// The verb on rendered footage with the bundled scene and settings of it.
   Outcome found_with(const std::vector<std::string>& settings, double offset = 0) const {
@@ -90,7 +73,7 @@ class Finger : public testing::Test {
   }
 
  private:
-  fs::path folder_;
+  test::TemporaryFolder folder_;
 };
 
 // Seen at 50°, where the finger's body hides three fifths of the outline: from above it hides all.

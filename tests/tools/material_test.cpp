@@ -10,6 +10,7 @@
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "tests/support/small_scenes.h"
+#include "tests/tools/program_call.h"
 #include "tools/material/history.h"
 #include "tools/verb.h"
 
@@ -82,20 +83,9 @@ TEST(MaterialHistory, RefusesWithLineAndValue) {
               HasSubstr("det F"));
 }
 
-struct Outcome {
-  int code;
-  std::string out, err;
-};
 Outcome run(std::vector<std::string> arguments) {
-  Program program;
-  program.name = "rhytid";
-  program.verbs.push_back(make_verb_material());
-  arguments.insert(arguments.begin(), {"rhytid", "material"});
-  std::vector<const char*> argv;
-  for (const std::string& a : arguments) argv.push_back(a.c_str());
-  std::ostringstream out, err;
-  const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-  return {code, out.str(), err.str()};
+  arguments.insert(arguments.begin(), "material");
+  return call_program(arguments, make_verb_material());
 }
 
 TEST(MaterialVerb, RunsAndWritesTheClosedForm) {

@@ -9,10 +9,11 @@
 #include <sstream>
 
 #include "fitting/colmap.h"
-#include "sim//output/atomic_file.h"
+#include "sim/output/atomic_file.h"
 #include "sim/scene/load.h"
 #include "sim/scene/parameter.h"
 #include "tests/support/paths.h"
+#include "tests/tools/program_call.h"
 #include "tools/bench/recovery_report.h"
 #include "tools/render/twin_run.h"
 #include "tools/verb.h"
@@ -154,11 +155,6 @@ TEST_F(RelaxingVariants, ChangeTheIntegrationOfFittedTimes) {
   for (const RecoveryVariant& v : recovery_variants()) EXPECT_TRUE(varied(v.name)) << v.name;
 }
 
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
 /// The tiny twin of fitting_verbs.sh, and the programs on it.
 class RecoveryBench : public testing::Test {
  protected:
@@ -188,18 +184,9 @@ class RecoveryBench : public testing::Test {
   std::string at(const std::string& name) const { return (folder_ / name).string(); }
 
   Outcome call(std::vector<std::string> arguments) const {
-    Program program{"rhytid", "test", {}, {}};
-    program.verbs.push_back(make_verb_render());
-    program.verbs.push_back(make_verb_track());
-    program.verbs.push_back(make_verb_fit());
-    program.verbs.push_back(make_verb_fitting_bench());
-    arguments.insert(arguments.begin(), "rhytid");
     arguments.insert(arguments.end(), {"--threads", "1"});
-    std::vector<const char*> argv;
-    for (const std::string& a : arguments) argv.push_back(a.c_str());
-    std::ostringstream out, err;
-    const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-    return {code, out.str(), err.str()};
+    return call_program(arguments, make_verb_render(), make_verb_track(), make_verb_fit(),
+                        make_verb_fitting_bench());
   }
   Outcome recovery(const std::string& folder, std::vector<std::string> more) const {
     more.insert(more.begin(), {"bench", "recovery", at("case.json"), "-o", at(folder)});

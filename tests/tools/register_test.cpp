@@ -12,6 +12,7 @@
 #include "sim/output/atomic_file.h"
 #include "tests/support/small_scenes.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/tools/program_call.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -21,11 +22,6 @@ std::unique_ptr<Verb> make_verb_register();
 namespace {
 
 using testing::HasSubstr;
-
-struct Call {
-  int code;
-  std::string out, err;
-};
 
 /// A folder with the drag scene, a case, and a lens; landmarks are vertices of the scene's grid.
 class Place {
@@ -61,17 +57,11 @@ class Place {
     return text;
   }
 
-  Call call(const std::vector<std::string>& more = {}) const {
-    Program program{"rhytid", "test", {}, {}};
-    program.verbs.push_back(make_verb_register());
-    std::vector<std::string> arguments = {
-        "rhytid", "register", at("case.json"), "--landmarks", at("landmarks.csv"), "-o", at("out")};
+  Outcome call(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"register", at("case.json"), "--landmarks", at("landmarks.csv"),
+                                          "-o",       at("out")};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    std::vector<const char*> argv;
-    for (const std::string& a : arguments) argv.push_back(a.c_str());
-    std::ostringstream out, err;
-    const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-    return {code, out.str(), err.str()};
+    return call_program(arguments, make_verb_register());
   }
 
   fitting::Camera camera;
@@ -83,7 +73,7 @@ class Place {
 TEST(Register, PlacesTheCameraAndDrawsTheMesh) {
   const Place place;
   write_file(place.at("landmarks.csv"), place.landmarks(false));
-  const Call call = place.call();
+  const Outcome call = place.call();
   ASSERT_EQ(call.code, 0) << call.err;
   const fitting::Camera found = fitting::read_camera(place.at("out/camera.yaml"));
   EXPECT_LT((found.rotation - place.camera.rotation).norm(), 1e-8);
@@ -105,7 +95,7 @@ TEST(Register, PlacesTheCameraAndDrawsTheMesh) {
 TEST(Register, NamesTheLandmarkThatIsWrong) {
   const Place place;
   write_file(place.at("landmarks.csv"), place.landmarks(true));
-  const Call call = place.call({"--sigma", "0.5"});
+  const Outcome call = place.call({"--sigma", "0.5"});
   EXPECT_EQ(call.code, 3);  // the pose is written, and doubtful
   EXPECT_THAT(call.err, HasSubstr("warning: doubtful pose: 'wrong' lies 9"));
   EXPECT_TRUE(std::filesystem::exists(place.at("out/camera.yaml")));
@@ -124,7 +114,7 @@ TEST(Register, DoubtsACameraBehindTheSkin) {
     text += line.substr(0, comma + 1) + std::to_string(480 - std::stod(line.substr(comma + 1))) + "\n";
   }
   write_file(place.at("landmarks.csv"), text);
-  const Call call = place.call();
+  const Outcome call = place.call();
   EXPECT_EQ(call.code, 3);
   EXPECT_THAT(call.out, HasSubstr("Doubt: the camera sees the patch from behind"));
 }
@@ -133,7 +123,7 @@ TEST(Register, BadInputIsOneLineAndLeavesNothing) {
   const Place place;
   const auto error = [&](const std::string& text, const std::vector<std::string>& more = {}) {
     write_file(place.at("landmarks.csv"), text);
-    const Call call = place.call(more);
+    const Outcome call = place.call(more);
     EXPECT_EQ(call.code, 2) << call.err;
     EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
     EXPECT_FALSE(std::filesystem::exists(place.at("out")));

@@ -102,7 +102,7 @@ std::vector<std::string> with(std::vector<std::string> list, const std::vector<s
 
 TEST(Screen, RanksParametersAndKeepsItsRuns) {
   const StudyPlace place;
-  const StudyCall first = place.call("screen", "scene.json", kTwoParameters);
+  const Outcome first = place.call("screen", "scene.json", kTwoParameters);
   ASSERT_EQ(first.code, 0) << first.err;
   for (const char* file :
        {"out/runs.csv", "out/effects.csv", "out/force_finger.svg", "out/force_finger_ranking.svg",
@@ -131,7 +131,7 @@ TEST(Screen, RanksParametersAndKeepsItsRuns) {
   EXPECT_NEAR(of_skin, sum / 2, 1e-9 * std::abs(sum));
 
   const std::string table = place.text("out/runs.csv"), effects = place.text("out/effects.csv");
-  const StudyCall again = place.call("screen", "scene.json", kTwoParameters);
+  const Outcome again = place.call("screen", "scene.json", kTwoParameters);
   EXPECT_EQ(again.code, 0);
   EXPECT_THAT(again.err, HasSubstr("runs finished before"));
   EXPECT_EQ(place.text("out/effects.csv"), effects);
@@ -145,8 +145,7 @@ TEST(Screen, RanksParametersAndKeepsItsRuns) {
   EXPECT_TRUE(place.has("out/rms_displacement_ranking.svg"));
   EXPECT_EQ(place.text("out/force_mine.svg"), mine);
   // Other settings are other runs.
-  const StudyCall other =
-      place.call("screen", "scene.json", with(kTwoParameters, {"--set", "/time/frames=1"}));
+  const Outcome other = place.call("screen", "scene.json", with(kTwoParameters, {"--set", "/time/frames=1"}));
   EXPECT_EQ(other.code, 0) << other.err;
   EXPECT_THAT(other.err, Not(HasSubstr("runs finished before")));
   EXPECT_NE(place.text("out/runs.csv"), table);
@@ -155,7 +154,7 @@ TEST(Screen, RanksParametersAndKeepsItsRuns) {
 TEST(Screen, ShardsTogetherMakeTheWhole) {
   const StudyPlace place, whole;
   ASSERT_EQ(whole.call("screen", "scene.json", kTwoParameters).code, 0);
-  const StudyCall part = place.call("screen", "scene.json", with(kTwoParameters, {"--shard", "1/2"}));
+  const Outcome part = place.call("screen", "scene.json", with(kTwoParameters, {"--shard", "1/2"}));
   EXPECT_EQ(part.code, 0) << part.err;
   EXPECT_THAT(part.out, HasSubstr("the figures are preliminary"));
   EXPECT_THAT(part.out, HasSubstr("part 1 of 2 is in"));
@@ -168,7 +167,7 @@ TEST(Screen, ShardsTogetherMakeTheWhole) {
 
 TEST(Screen, SobolIndicesOfAPairThroughTheVerb) {
   const StudyPlace place;
-  const StudyCall call =
+  const Outcome call =
       place.call("screen", "scene.json", with(kTwoParameters, {"--sobol", "4", "--factor", "1.5"}));
   ASSERT_EQ(call.code, 0) << call.err;
   const auto rows = rows_of(place.at("out/indices.csv"));
@@ -180,7 +179,7 @@ TEST(Screen, SobolIndicesOfAPairThroughTheVerb) {
 
 TEST(Screen, RunsThatDoNotConvergeAreCountedAndLeftOut) {
   const StudyPlace place;
-  const StudyCall call = place.call(
+  const Outcome call = place.call(
       "screen", "scene.json",
       with(kTwoParameters, {"--set", "/solver/max_iterations=1", "--set", "/time/max_bisections=0"}));
   EXPECT_EQ(call.code, 3);
@@ -192,7 +191,7 @@ TEST(Screen, RunsThatDoNotConvergeAreCountedAndLeftOut) {
 TEST(Screen, RefusesInOneLine) {
   const StudyPlace place;
   const auto error_of = [&](const std::vector<std::string>& more) {
-    const StudyCall call = place.call("screen", "scene.json", more);
+    const Outcome call = place.call("screen", "scene.json", more);
     EXPECT_EQ(call.code, 2) << call.err;
     EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
     EXPECT_FALSE(place.has("out"));

@@ -2,35 +2,24 @@
 #pragma once
 
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "sim/output/atomic_file.h"
 #include "tests/support/small_scenes.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/tools/program_call.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
 
 std::unique_ptr<Verb> make_verb_study();
 
-struct StudyCall {
-  int code;
-  std::string out, err;
-};
-
 /// Runs "rhytid study" with these arguments on one thread.
-inline StudyCall call_study(std::vector<std::string> arguments) {
-  Program program{"rhytid", "test", {}, {}};
-  program.verbs.push_back(make_verb_study());
-  arguments.insert(arguments.begin(), {"rhytid", "study"});
+inline Outcome call_study(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "study");
   arguments.insert(arguments.end(), {"--threads", "1"});
-  std::vector<const char*> argv;
-  for (const std::string& a : arguments) argv.push_back(a.c_str());
-  std::ostringstream out, err;
-  const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-  return {code, out.str(), err.str()};
+  return call_program(arguments, make_verb_study());
 }
 
 /// A folder of its own for a test, with a small scene of two frames in it, gone afterwards.
@@ -41,8 +30,8 @@ class StudyPlace {
   bool has(const std::string& file) const { return std::filesystem::exists(at(file)); }
   std::string text(const std::string& file) const { return read_file(at(file)); }
   /// "sweep", FILE, -o FOLDER/out, a coarse mesh and these arguments.
-  StudyCall call(const std::string& study, const std::string& file,
-                 const std::vector<std::string>& more = {}) const {
+  Outcome call(const std::string& study, const std::string& file,
+               const std::vector<std::string>& more = {}) const {
     std::vector<std::string> arguments = {study, at(file), "-o", at("out"), "--set", test::coarse()[0]};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return call_study(arguments);

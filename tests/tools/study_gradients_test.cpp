@@ -92,7 +92,7 @@ TEST(Sensitivity, ResponsesHaveFilesOfTheirOwnAndDoNotDependOnTheView) {
       "--set",       "/ligaments/sources/0/name=a b",      "--set",       "/ligaments/sources/1/name=a_b",
       "--parameter", "/ligaments/sources/0/strength",      "--parameter", "/ligaments/sources/1/strength",
       "--parameter", "/colliders/finger/path/1/position/0"};
-  const StudyCall call = place.call("sensitivity", "scene.json", arguments);
+  const Outcome call = place.call("sensitivity", "scene.json", arguments);
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_TRUE(place.has("out/response_a_b_strength.png"));
   EXPECT_TRUE(place.has("out/response_a_b_strength_2.png"));
@@ -106,7 +106,7 @@ TEST(Sensitivity, ResponsesHaveFilesOfTheirOwnAndDoNotDependOnTheView) {
   EXPECT_EQ(whole["parameters"][2]["coordinate_unit"], "5 mm");
   auto along = arguments;
   along.insert(along.end(), {"--view", "0", "0", "-3"});
-  const StudyCall seen_call = place.call("sensitivity", "scene.json", along);
+  const Outcome seen_call = place.call("sensitivity", "scene.json", along);
   EXPECT_THAT(seen_call.out, HasSubstr("seen along (0, 0, -1)"));
   const auto seen = nlohmann::json::parse(place.text("out/sensitivity.json"));
   EXPECT_EQ(seen["view"], nlohmann::json({0.0, 0.0, -1.0}));
@@ -119,7 +119,7 @@ TEST(Sensitivity, ResponsesHaveFilesOfTheirOwnAndDoNotDependOnTheView) {
 
 TEST(Sensitivity, OfASceneThroughTheVerb) {
   const StudyPlace place;
-  const StudyCall call = place.call("sensitivity", "scene.json");
+  const Outcome call = place.call("sensitivity", "scene.json");
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_THAT(call.out, HasSubstr("All stiffnesses together"));
   for (const char* file :
@@ -149,7 +149,7 @@ TEST(Sensitivity, OfASceneThroughTheVerb) {
   const auto figure_at = [&](double factor) {
     const StudyPlace other;
     const std::string left = std::to_string(0.5 * factor), right = std::to_string(3 * factor);
-    const StudyCall run = other.call(
+    const Outcome run = other.call(
         "sensitivity", "scene.json",
         {"--parameter", "/ligaments/stiffness", "--set", "/ligaments/sources/left/strength=" + left, "--set",
          "/ligaments/sources/right/strength=" + right});
@@ -179,7 +179,7 @@ TEST(Sensitivity, OfForcesEnergyAndWrinkles) {
       "measure": {"wavelengths": ["1 mm", "12 mm"], "line": {"from": [-7, 0, 0], "to": [7, 0, 0]},
                   "window": {"centre": [0, 0, 0], "size": [14, 10]}},
       "variants": [{"name": "one", "settings": []}]})");
-    const StudyCall call = place.call(
+    const Outcome call = place.call(
         "sensitivity", "experiment.json",
         {"--parameter", film, "--parameter", knot, "--set", film + "=" + std::to_string(1 * factor) + " MPa",
          "--set", knot + "=" + std::to_string(8 + shift) + " mm"});
@@ -208,7 +208,7 @@ TEST(Sensitivity, OfForcesEnergyAndWrinkles) {
 TEST(Sensitivity, RefusesInOneLine) {
   const StudyPlace place;
   const auto error_of = [&](const std::vector<std::string>& more) {
-    const StudyCall call = place.call("sensitivity", "scene.json", more);
+    const Outcome call = place.call("sensitivity", "scene.json", more);
     EXPECT_EQ(call.code, 2) << call.err;
     EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
     EXPECT_FALSE(place.has("out"));
@@ -234,7 +234,7 @@ TEST(Sensitivity, HoldsOnlyWhatHasAnEffect) {
   for (const char* knot : {"0", "1", "2"})  // the finger never touches
     arguments.insert(arguments.end(),
                      {"--set", std::string("/colliders/finger/path/") + knot + "/position/2=90"});
-  const StudyCall call = place.call("sensitivity", "scene.json", arguments);
+  const Outcome call = place.call("sensitivity", "scene.json", arguments);
   EXPECT_EQ(call.code, 2);
   EXPECT_THAT(call.err, HasSubstr("--hold: got '/base/stiffness', expected a parameter that has an effect"));
 }
@@ -252,7 +252,7 @@ const std::vector<std::string> kUnknowns = {"--parameter", "/ligaments/sources/l
 TEST(PlanStudy, RanksSwipesAndKeepsThem) {
   const StudyPlace place;
   write_file(place.at("swipes.json"), swipes());
-  const StudyCall call = place.call("plan", "swipes.json", kUnknowns);
+  const Outcome call = place.call("plan", "swipes.json", kUnknowns);
   ASSERT_EQ(call.code, 0) << call.err;
   for (const char* file : {"swipes.csv", "pairs.csv", "order.csv", "posterior.svg", "plan.txt", "index.html",
                            "along/variant.json"})
@@ -269,14 +269,14 @@ TEST(PlanStudy, RanksSwipesAndKeepsThem) {
   EXPECT_THAT(call.out, HasSubstr(place.text("out/plan.txt")));
   sharper.insert(sharper.end(), {"--noise", "0.001", "--prior-of", "/ligaments/sources/left/strength=0.5"});
   const std::string before = place.text("out/swipes.csv");
-  const StudyCall again = place.call("plan", "swipes.json", sharper);
+  const Outcome again = place.call("plan", "swipes.json", sharper);
   EXPECT_EQ(again.code, 0) << again.err;
   EXPECT_THAT(again.err, HasSubstr("along: complete before, kept"));
   EXPECT_THAT(again.err, Not(HasSubstr("runs")));
   EXPECT_NE(place.text("out/swipes.csv"), before);
   auto filmed = kUnknowns;
   filmed.insert(filmed.end(), {"--filmed", "along"});
-  const StudyCall next = place.call("plan", "swipes.json", filmed);
+  const Outcome next = place.call("plan", "swipes.json", filmed);
   EXPECT_THAT(next.out, HasSubstr("film next across ("));
   // Named twice it is filmed once.
   const std::string once =
@@ -289,9 +289,9 @@ TEST(PlanStudy, RanksSwipesAndKeepsThem) {
 TEST(PlanStudy, OfPlacesHasLengths) {
   const StudyPlace place;
   write_file(place.at("swipes.json"), swipes());
-  const StudyCall call = place.call("plan", "swipes.json",
-                                    {"--parameter", "/ligaments/sources/left/position/0", "--parameter",
-                                     "/skin/layers/soft/poissons_ratio"});
+  const Outcome call = place.call("plan", "swipes.json",
+                                  {"--parameter", "/ligaments/sources/left/position/0", "--parameter",
+                                   "/skin/layers/soft/poissons_ratio"});
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_THAT(call.out, testing::ContainsRegex("left position x +10 mm +[0-9.e-]+ mm"));
   EXPECT_THAT(call.out, testing::ContainsRegex("soft poissons_ratio +odds factor 2.7"));
@@ -301,7 +301,7 @@ TEST(PlanStudy, RefusesInOneLine) {
   const StudyPlace place;
   const auto error_of = [&](const std::string& experiment, const std::vector<std::string>& more) {
     write_file(place.at("swipes.json"), experiment);
-    const StudyCall call = place.call("plan", "swipes.json", more);
+    const Outcome call = place.call("plan", "swipes.json", more);
     EXPECT_EQ(call.code, 2) << call.err;
     EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
     EXPECT_FALSE(place.has("out"));

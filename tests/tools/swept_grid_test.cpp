@@ -23,13 +23,13 @@ TEST(SweptGrid, OfASceneRunsInShardsAndKeepsWhatIsFinished) {
       {"--grid", "/skin/layers/soft/youngs_modulus=20 kPa,40 kPa", "--grid", "/ligaments/stiffness=0.0005"});
   auto part = grid;
   part.insert(part.end(), {"--shard", "2/2"});
-  const StudyCall second = place.call("sweep", "scene.json", part);
+  const Outcome second = place.call("sweep", "scene.json", part);
   ASSERT_EQ(second.code, 0) << second.err;
   EXPECT_THAT(second.out, HasSubstr("part 2 of 2 is in " + place.at("out")));
   EXPECT_TRUE(place.has("out/0002/variant.json"));
   for (const char* table : {"results.csv", "results.md", "index.html"})  // another machine may be writing
     EXPECT_FALSE(place.has(std::string("out/") + table)) << table;
-  const StudyCall all = place.call("sweep", "scene.json", grid);
+  const Outcome all = place.call("sweep", "scene.json", grid);
   ASSERT_EQ(all.code, 0) << all.err;
   EXPECT_THAT(all.err, HasSubstr("0002: complete before, kept"));
   EXPECT_THAT(all.err, HasSubstr("0001: starts"));
@@ -43,7 +43,7 @@ TEST(SweptGrid, OfASceneRunsInShardsAndKeepsWhatIsFinished) {
 TEST(SweptGrid, OfATableTakesItsNames) {
   const StudyPlace place;
   write_file(place.at("table.csv"), "name,/skin/layers/soft/youngs_modulus\nsoft,20 kPa\n");
-  const StudyCall call = place.call("sweep", "scene.json", quiet({"--csv", place.at("table.csv")}));
+  const Outcome call = place.call("sweep", "scene.json", quiet({"--csv", place.at("table.csv")}));
   ASSERT_EQ(call.code, 0) << call.err;
   EXPECT_TRUE(place.has("out/soft/steps.csv"));
 }
@@ -52,7 +52,7 @@ TEST(SweptGrid, RefusesInOneLine) {
   const StudyPlace place;
   write_file(place.at("table.csv"), "/skin/ordr\n2\n");
   const auto error_of = [&](const std::vector<std::string>& more) {
-    const StudyCall call = place.call("sweep", "scene.json", more);
+    const Outcome call = place.call("sweep", "scene.json", more);
     EXPECT_EQ(call.code, 2) << call.err;
     EXPECT_EQ(std::count(call.err.begin(), call.err.end(), '\n'), 1) << call.err;
     EXPECT_FALSE(place.has("out"));
@@ -92,12 +92,12 @@ TEST(SweptGrid, AndPlanDoNotShareAFolder) {
   EXPECT_EQ(call({"sensitivity", file}).code, 0);
   EXPECT_TRUE(place.has("run/press_sensitivity/sensitivity.json"));
   // Led into each other's they are refused, and change nothing.
-  const StudyCall plan = call({"plan", file, "-o", "run/press_quick"});
+  const Outcome plan = call({"plan", file, "-o", "run/press_quick"});
   EXPECT_EQ(plan.code, 2);
   EXPECT_THAT(plan.err, HasSubstr("run/press_quick/a: got a run of a sweep"));
   EXPECT_FALSE(place.has("run/press_quick/swipes.csv"));
   const std::string swipe = place.text("run/press_quick_plan/a/variant.json");
-  const StudyCall sweep = call({"sweep", file, "-o", "run/press_quick_plan"}, false);
+  const Outcome sweep = call({"sweep", file, "-o", "run/press_quick_plan"}, false);
   EXPECT_EQ(sweep.code, 2);
   EXPECT_THAT(sweep.err, HasSubstr("run/press_quick_plan/a: got a swipe of `study plan`"));
   EXPECT_EQ(place.text("run/press_quick_plan/a/variant.json"), swipe);

@@ -10,7 +10,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
-#include <sstream>
 
 #include "fitting/cameras.h"
 #include "fitting/observations.h"
@@ -18,6 +17,7 @@
 #include "sim/scene/collider_motion.h"
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
+#include "tests/tools/program_call.h"
 #include "tools/render/finger.h"
 #include "tools/render/skin_camera.h"
 #include "tools/render/skin_renderer.h"
@@ -55,21 +55,8 @@ constexpr const char* case_text = R"({
   "track": {"max_tracks": 60, "min_distance": 6}
 })";
 
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
 Outcome run(const std::vector<std::string>& arguments) {
-  Program program;
-  program.name = "rhytid";
-  program.verbs.push_back(make_verb_render());
-  program.verbs.push_back(make_verb_track());
-  std::vector<const char*> argv = {"rhytid"};
-  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
-  std::ostringstream out, err;
-  const int code = run_program(program, static_cast<int>(argv.size()), argv.data(), out, err);
-  return {code, out.str(), err.str()};
+  return call_program(arguments, make_verb_render(), make_verb_track());
 }
 
 /// One rendered twin for all tests.

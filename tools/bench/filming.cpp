@@ -139,6 +139,7 @@ void compare(const FilmedSkin& skin, const Filming& filming, const fitting::Trac
       ++out->off_skin;
       continue;
     }
+    require(track.observations.back().frame < skin.frames(), "score_filming: a frame that was not filmed");
     const auto shared = track.shared_covariances();
     for (size_t i = 1; i < track.observations.size(); ++i) {
       const Observation& o = track.observations[i];

@@ -22,12 +22,10 @@ struct Compared {
   Minimiser method;
   MinimiserRun run;
   std::vector<double> seconds, wall_seconds;
-  std::vector<std::vector<double>> frame_seconds;  ///< [frame][repeat]
+  std::vector<std::vector<double>> frame_seconds;  ///< [repeat][frame]
 
   void add(MinimiserRun next) {
-    frame_seconds.resize(std::max(frame_seconds.size(), next.frame_seconds.size()));
-    for (std::size_t f = 0; f < next.frame_seconds.size(); ++f)
-      frame_seconds[f].push_back(next.frame_seconds[f]);
+    frame_seconds.push_back(next.frame_seconds);
     seconds.push_back(next.seconds);
     wall_seconds.push_back(next.wall_seconds);
     run = std::move(next);
@@ -113,14 +111,18 @@ class Tables {
   /// Ratios are those of the runs of one round, which followed each other.
   void add_frame(const std::string& scene, int nodes, const Compared& c, const Compared& first,
                  std::size_t f) {
-    std::vector<double> ratios;
-    if (f < first.frame_seconds.size())
-      for (std::size_t k = 0; k < std::min(c.frame_seconds[f].size(), first.frame_seconds[f].size()); ++k)
-        ratios.push_back(c.frame_seconds[f][k] / first.frame_seconds[f][k]);
+    std::vector<double> seconds, ratios;
+    for (std::size_t k = 0; k < c.frame_seconds.size(); ++k) {
+      if (f >= c.frame_seconds[k].size()) continue;
+      seconds.push_back(c.frame_seconds[k][f]);
+      if (k < first.frame_seconds.size() && f < first.frame_seconds[k].size() &&
+          first.frame_seconds[k][f] > 0)
+        ratios.push_back(c.frame_seconds[k][f] / first.frame_seconds[k][f]);
+    }
     const auto [least, largest] = std::minmax_element(ratios.begin(), ratios.end());
     frames_csv_.add_row({scene, std::int64_t{nodes}, std::string(name(c.method)),
                          static_cast<std::int64_t>(f) + 1, std::int64_t{c.run.frame_iterations[f]},
-                         median(c.frame_seconds[f]), ratios.empty() ? NAN : median(ratios),
+                         median(seconds), ratios.empty() ? NAN : median(ratios),
                          ratios.empty() ? NAN : *least, ratios.empty() ? NAN : *largest});
   }
 

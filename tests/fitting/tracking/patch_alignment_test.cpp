@@ -86,6 +86,28 @@ TEST(PatchAlignment, CovarianceIsTheScatterForCorrelatedNoise) {
   check_covariance(1, 3);
 }
 
+/// ResidualCorrelation::variance_ratio of 30 draws of noise.
+double variance_ratio(int half, double smoothing) {
+  const Speckle skin(kSize, kSize, 12);
+  std::vector<Alignment> alignments;
+  for (int draw = 0; draw < 30; ++draw) {
+    const PatchTemplate patch =
+        cut_template(spline_of(picture(skin, {}, 1, 1000 + draw), smoothing), kCentre, half);
+    alignments.push_back(align(patch, spline_of(picture(skin, {}, 1, 2000 + draw), smoothing),
+                               {kCentre, Eigen::Matrix2d::Identity()}, {}));
+  }
+  std::vector<const Alignment*> pointers;
+  for (const Alignment& a : alignments) pointers.push_back(&a);
+  return ResidualCorrelation(pointers).variance_ratio();
+}
+
+TEST(PatchAlignment, NoiseThatTheFitFollowsIsCounted) {
+  EXPECT_GT(variance_ratio(6, 2), 1.3);
+  EXPECT_LT(variance_ratio(kHalf, 0.5), 1.05);
+  // In small windows the estimate is uncertain, but the noise is never less than residuals and unknowns say.
+  EXPECT_EQ(variance_ratio(3, 0.5), 1);
+}
+
 TEST(PatchAlignment, SaysWhyItFailed) {
   const Speckle skin(kSize, kSize, 13);
   const SplineImage image = spline_of(picture(skin, {}, 0, 0), 0);
