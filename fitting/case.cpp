@@ -45,7 +45,7 @@ FitCase read_fit(const json& j) {
   c.robust_scale = j["robust_scale"], c.min_sigma = j["min_sigma"];
   c.first_frame = j["first_frame"], c.last_frame = j["last_frame"];
   c.rim_margin = j["rim_margin"], c.gauge_layer = j["gauge_layer"];
-  c.discretisation_check = j["discretisation_check"];
+  c.discretisation_check = j["discretisation_check"], c.path_deviations = j["path_deviations"];
   if (j.contains("wrinkles")) {
     const json& w = j["wrinkles"];
     WrinkleLine line;
@@ -60,6 +60,8 @@ FitCase read_fit(const json& j) {
     for (int a = 0; a < 3; ++a) r.low[a] = region["box"]["low"][a], r.high[a] = region["box"]["high"][a];
     c.still.push_back(std::move(r));
   }
+  for (const json& rule : j["frame_weights"])
+    c.frame_weights.push_back({rule["from"], rule["to"], rule["weight"], rule["half_every"]});
   c.starts = j["starts"], c.local_fits = j["local_fits"], c.start_spread = j["start_spread"];
   c.screen_frames = j["screen_frames"], c.seed = j["seed"];
   return c;
@@ -246,7 +248,7 @@ void read_clips(const LocatedJson& located, Case& c) {
     else if (root.contains("truth"))  // that of the case, as if the clip were the case
       std::tie(clip.truth_scene, clip.truth_settings) =
           read_truth(located, "/truth", {clip.scene, clip.scene_settings, own});
-    clip.measurements = j.value("measurements", "");
+    clip.measurements = j.value("measurements", ""), clip.weight = j["weight"];
     if (j.contains("cameras"))
       for (std::size_t v = 0; v < j["cameras"].size(); ++v) {
         const json& seen = j["cameras"][v];
@@ -344,6 +346,12 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
       const std::string pointer = "/fit/still/" + std::to_string(i) + "/box";
       throw InputError(located.where(pointer) + ": " + pointer,
                        shown_json(located.json["fit"]["still"][i]["box"]), "low below high in x, y and z");
+    }
+  for (std::size_t i = 0; i < c.fit.frame_weights.size(); ++i)
+    if (const FrameWeight& rule = c.fit.frame_weights[i]; rule.to != 0 && rule.to < rule.from) {
+      const std::string pointer = "/fit/frame_weights/" + std::to_string(i) + "/to";
+      throw InputError(located.where(pointer) + ": " + pointer, std::to_string(rule.to),
+                       "0 (all from there on) or at least from, " + std::to_string(rule.from));
     }
   if (c.fit.last_frame != 0 && c.fit.last_frame < c.fit.first_frame)
     throw InputError(located.where("/fit/last_frame") + ": /fit/last_frame", std::to_string(c.fit.last_frame),

@@ -40,6 +40,11 @@ struct FitParameter {
   std::optional<ParameterTransform> transform;
   std::optional<double> prior_sigma;  ///< standard deviation of a Gaussian prior in the transformed parameter
   std::string clip = {};  ///< of this clip alone; empty: shared by all clips whose scene has the address
+  /// What moves by how much when the value goes from 0 to 1, where it is none of the scene's own parameters but
+  /// moves several (path_deviations.h). `address` then only names it, `initial` and bounds are given.
+  std::vector<std::pair<std::string, double>> moves = {};
+  std::string name = {};   ///< for reports; of the scene's own parameters the scene says it
+  std::string group = {};  ///< parameters of one name here are considered as one, by the sum of what they do
 };
 
 struct RenderCase {
@@ -72,6 +77,14 @@ struct StageCase {
   std::string words() const;      ///< what it does otherwise, for messages
 };
 
+/// What observations of some frames weigh; of several that hold a frame the last counts.
+struct FrameWeight {
+  int from = 1, to = 0;   ///< frames, both included; to 0: all from there on
+  double weight = 1;      ///< in [0, 1]; 0: they are not compared
+  double half_every = 0;  ///< frames after which it has fallen to the half, again and again; 0: it does not
+};
+double frame_weight(const std::vector<FrameWeight>& rules, int frame);
+
 struct FitCase {
   std::vector<FitParameter> parameters;
   std::vector<StageCase> stages;    ///< before the fit, in order
@@ -80,7 +93,9 @@ struct FitCase {
   double robust_scale = 3;          ///< Huber threshold in standard deviations; 0 = plain least squares
   double min_sigma = 0.05;  ///< px, floor of the standard deviation of a displacement since frame 0, per axis
   int first_frame = 1, last_frame = 0;  ///< frames used, 0 = all
-  double rim_margin = 1;                ///< mm: tracks closer to the rim of the patch are left out
+  std::vector<FrameWeight> frame_weights;
+  double clip_weight = 1;  ///< in (0, 1], of the clip that this is for; the fit sets it
+  double rim_margin = 1;   ///< mm: tracks closer to the rim of the patch are left out
   /// Where tracked points stand still on the head: its motion is taken out by them. Empty: it stands still.
   std::vector<StillRegion> still;
   std::optional<WrinkleLine> wrinkles;  ///< where measured wrinkles are
@@ -97,6 +112,7 @@ struct FitCase {
   /// Held parameters whose error enters the intervals (consider.h), σ_h in prior_sigma. Nothing given: the friction
   /// coefficients that are not fitted.
   std::optional<std::vector<FitParameter>> consider;
+  std::string path_deviations = "consider";  ///< consider | fit | ignore: of a path_file that states them
   /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden
   /// yardstick.
   std::string gauge_layer;  ///< layer whose modulus is fixed; default: the innermost
@@ -120,6 +136,7 @@ struct ClipCase {
   std::vector<Setting> truth_settings;
   std::vector<ViewCase> views;  ///< at least one
   std::string measurements;     ///< as that of Case
+  double weight = 1;            ///< in (0, 1]: of its tracks, against those of other clips
 };
 
 struct Case {

@@ -10,6 +10,9 @@ namespace rhytid::fitting {
 const std::vector<Rule>& case_rules();
 const RuleNode& case_rule_tree();
 
+/// Those of /fit.
+std::vector<Rule> fit_rules();
+
 /// JSON Schema (draft 2020-12) of case files, for editors.
 nlohmann::json case_schema();
 /// The case format as Markdown.

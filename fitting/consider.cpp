@@ -1,5 +1,6 @@
 #include "fitting/consider.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -7,6 +8,7 @@
 #include <set>
 
 #include "fitting/fit_logs.h"
+#include "fitting/path_deviations.h"
 #include "sim/core/error.h"
 #include "sim/scene/parameter.h"
 
@@ -32,6 +34,27 @@ std::string off_by(const FitVariable& v, double sigma) {
   return text;
 }
 
+/// Of errors that are told together what matters is Σ δ δᵀ: as many axes as there are parameters say it.
+void sum_up(SystematicShift& found) {
+  if (found.axes.empty()) return;
+  const auto n = static_cast<Eigen::Index>(found.axes.front().size());
+  MatrixXd sum = MatrixXd::Zero(n, n);
+  for (const std::vector<double>& axis : found.axes) {
+    const Eigen::Map<const VectorXd> shift(axis.data(), n);
+    sum += shift * shift.transpose();
+  }
+  const VectorXd size = sum.diagonal().cwiseSqrt();
+  found.shift.assign(size.begin(), size.end());
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(sum);
+  found.axes.clear();
+  for (Eigen::Index a = n - 1; a >= 0; --a) {
+    if (!(eigen.eigenvalues()[a] > 0)) continue;
+    const VectorXd axis = std::sqrt(eigen.eigenvalues()[a]) * eigen.eigenvectors().col(a);
+    found.axes.emplace_back(axis.begin(), axis.end());
+  }
+  if (found.axes.empty()) found.axes.push_back(found.shift);  // nothing moves
+}
+
 }  // namespace
 
 std::vector<FitParameter> considered_parameters(const JointFitInput& input) {
@@ -42,6 +65,7 @@ std::vector<FitParameter> considered_parameters(const JointFitInput& input) {
     });
     if (!is_known && !is_fitted(input, p)) list.push_back(p);
   };
+  for (const FitParameter& p : input.path_errors) add(p);
   if (input.options.consider) {
     for (const FitParameter& p : *input.options.consider) add(p);
     return list;
@@ -89,6 +113,7 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, Joint
     for (int c = 0; c < problem.num_clips(); ++c) {
       // As it was in the fit's run: penalties follow the gauge modulus when that is fitted.
       const Scene scene = problem.clip(c).parametrisation().scene(problem.of_clip(c, t));
+      if (!p.moves.empty()) break;
       const std::vector<ParameterSpec> known = all_parameters(scene);
       const bool has_it = std::any_of(known.begin(), known.end(),
                                       [&](const ParameterSpec& spec) { return spec.address == p.address; });
@@ -98,6 +123,7 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, Joint
     }
     wide.options.parameters.push_back(std::move(p));
   }
+  release_paths(wide);
   if (!wide.evaluations.empty()) wide.evaluations += "/considered";
   const auto start = std::chrono::steady_clock::now();
   std::vector<SystematicShift> shifts;
@@ -117,9 +143,13 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, Joint
       const Eigen::Index column = n + static_cast<Eigen::Index>(h);
       const FitVariable& v = considered.variables()[static_cast<std::size_t>(column)];
       const double sigma = *held[h].prior_sigma;
-      SystematicShift& found = shifts.emplace_back();
-      found.name = "held " + v.name;
-      found.change = v.name + " " + off_by(v, sigma);
+      const std::string& group = held[h].group;
+      if (group.empty() || h == 0 || held[h - 1].group != group) {
+        shifts.emplace_back().name = "held " + (group.empty() ? v.name : group);
+        shifts.back().change = group.empty() ? v.name + " " + off_by(v, sigma)
+                                             : group + ", off by the deviations that its file states";
+      }
+      SystematicShift& found = shifts.back();
       const double used = v.to_parameter(all[column]);
       if (!at)
         found.failure = considered.last_failure();
@@ -132,8 +162,12 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, Joint
       const VectorXd shift =
           -sigma *
           (basis * (basis.transpose() * (linearised.jacobian.transpose() * at->jacobian.col(column))));
-      found.shift.assign(shift.begin(), shift.end());
+      if (group.empty())
+        found.shift.assign(shift.begin(), shift.end());
+      else
+        found.axes.emplace_back(shift.begin(), shift.end());
     }
+    for (SystematicShift& found : shifts) sum_up(found);
   } catch (const InputError& error) {
     SystematicShift& found = shifts.emplace_back();
     found.name = "held", found.change = "held parameters", found.failure = error.what();

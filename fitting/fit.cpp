@@ -9,6 +9,7 @@
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
 #include "fitting/further_views.h"
+#include "fitting/path_deviations.h"
 #include "fitting/profile.h"
 #include "fitting/stages.h"
 #include "fitting/starts.h"
@@ -100,8 +101,11 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Star
     if (held.empty()) stop_here();
     result.systematic.insert(result.systematic.end(), held.begin(), held.end());
   }
-  for (const SystematicShift& shift : result.systematic)
-    if (shift.failure.empty()) found.add_systematic(shift.shift);
+  for (const SystematicShift& shift : result.systematic) {
+    if (!shift.failure.empty()) continue;
+    if (shift.axes.empty()) found.add_systematic(shift.shift);
+    for (const std::vector<double>& axis : shift.axes) found.add_systematic(axis);
+  }
   add_parameters(problem, t, &found, truth, result);
   add_modulus_ratios(problem, found, t, truth, result);
   add_clip_chi_squares(problem, *linearised, found, result);
@@ -155,8 +159,9 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
                  observer);
 }
 
-FitResult run_fit(const JointFitInput& input, const FitObserver& observer) {
+FitResult run_fit(const JointFitInput& given, const FitObserver& observer) {
   const auto start = std::chrono::steady_clock::now();
+  const JointFitInput input = with_path_errors(given);
   JointProblem problem(input.clips, input.options);
   problem.on_run = observer.run;
   problem.stop_when(observer.should_stop);

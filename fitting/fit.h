@@ -37,6 +37,9 @@ struct JointFitInput {
   /// As FitInput::evaluations; of several clips each has a folder of its name in there.
   std::string evaluations = {};
   bool anew = false;
+  /// How paths of colliders may be off, σ = 1 each, and sentences about it (path_deviations.h); run_fit fills them in.
+  std::vector<FitParameter> path_errors = {};
+  std::vector<std::string> path_notes = {};
 };
 
 struct FitObserver {

@@ -146,7 +146,8 @@ std::string shift_table(const FitResult& result) {
         char moved[32] = "-";  // of what is not determined there is nothing to move
         const double value = is_log ? 100 * std::expm1(d.shift[k]) : d.shift[k];
         if (p.determined || std::fabs(d.shift[k]) < 1)
-          std::snprintf(moved, sizeof(moved), is_log ? "%+.1f" : "%+.3g", value);
+          std::snprintf(moved, sizeof(moved),
+                        d.axes.empty() ? (is_log ? "%+.1f" : "%+.3g") : (is_log ? "±%.1f" : "±%.3g"), value);
         row.push_back(moved);
       }
     rows.push_back(std::move(row));

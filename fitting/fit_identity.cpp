@@ -65,12 +65,21 @@ std::string parameters_digest(const FitCase& fit, const Parametrisation& paramet
   for (const FitVariable& v : parametrisation.variables()) {
     d.text(v.address);
     d.number(static_cast<double>(v.transform));
+    for (const auto& [address, amount] : v.moves) {
+      d.text(address);
+      d.number(amount);
+    }
     for (const double x : {v.initial, v.lower, v.upper, v.prior_sigma.value_or(0)}) d.number(x);
   }
   d.text(parametrisation.gauge_layer());
   for (const double x : {fit.robust_scale, fit.min_sigma, static_cast<double>(fit.first_frame),
                          static_cast<double>(fit.last_frame), fit.rim_margin})
     d.number(x);
+  for (const FrameWeight& rule : fit.frame_weights)  // none: the log of before there were any
+    for (const double x :
+         {static_cast<double>(rule.from), static_cast<double>(rule.to), rule.weight, rule.half_every})
+      d.number(x);
+  if (fit.clip_weight != 1) d.number(fit.clip_weight);
   for (const StillRegion& region : fit.still) {
     d.matrix(region.low);
     d.matrix(region.high);
@@ -91,7 +100,9 @@ FitIdentity fit_identity(const FitInput& input, const FitProblem& problem) {
   return fit_identity(FitClip{{}, {}, input.scene, {input.camera}, input.tracks}, input.options, problem);
 }
 
-FitIdentity fit_identity(const FitClip& clip, const FitCase& options, const FitProblem& problem) {
+FitIdentity fit_identity(const FitClip& clip, const FitCase& given, const FitProblem& problem) {
+  FitCase options = given;
+  options.clip_weight = clip.weight;
   std::string cameras;
   for (const Camera& camera : clip.cameras) cameras += camera_digest(camera);
   return {{"program", program_digest()},

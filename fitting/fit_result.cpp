@@ -72,6 +72,7 @@ void fields(Archive& field, Record& d) {
   field("rms_px", d.rms_px);
   field("seconds", d.seconds);
   field("shift", d.shift);
+  field.optional("axes", d.axes);
 }
 
 template <class Archive, Writable<FittedStage> Record>
@@ -384,6 +385,7 @@ void check_sizes(const FitResult& result, const std::string& where) {
 
 std::string FitResult::address_in_clip(const FittedParameter& parameter, int clip) const {
   const std::string& address = parameter.address;
+  if (address.find("/path/offset/") != std::string::npos) return {};  // it moves many (path_deviations.h)
   const std::string prefix = "/clips/";
   if (!address.starts_with(prefix)) return address;
   const std::size_t end = std::min(address.find('/', prefix.size()), address.size());

@@ -39,6 +39,8 @@ struct SystematicShift {
   double rms_px = 0;          ///< by which predictions moved, over all observations; 0 where not looked at
   double seconds = 0;         ///< that it took
   std::vector<double> shift;  ///< [parameters] of the transformed parameters; empty when it was not run
+  /// Of several errors that are told together: shifts whose squares add up to those of `shift`, which has no sign then.
+  std::vector<std::vector<double>> axes = {};
   bool is_held() const { return name.starts_with("held"); }
 };
 
@@ -177,7 +179,8 @@ struct FitResult {
   /// those of the first.
   std::vector<FittedClip> clips;
   std::vector<Scene> fitted_scenes;  ///< of the clips, to be written; not read back
-  /// The address of a fitted parameter in the scene of a clip; empty when it is another clip's.
+  /// The address of a fitted parameter in the scene of a clip; empty when it is another clip's, or the offset of a
+  /// path, which is no parameter of a scene.
   std::string address_in_clip(const FittedParameter& parameter, int clip) const;
 };
 

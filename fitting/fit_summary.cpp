@@ -67,6 +67,21 @@ void note_head_motion(const FitProblem& clip, FitResult& result) {
   }
 }
 
+void note_weights(const JointFitInput& input, FitResult& result) {
+  std::string list;
+  const auto add = [&list](const std::string& text) { list += (list.empty() ? "" : ", ") + text; };
+  for (const FrameWeight& rule : input.options.frame_weights)
+    add("frames " + std::to_string(rule.from) +
+        (rule.to > 0 ? " to " + std::to_string(rule.to) : std::string(" on")) +
+        number(" weigh %.3g", rule.weight) +
+        (rule.half_every > 0 ? number(", half of it every %.3g frames", rule.half_every) : std::string()));
+  for (const FitClip& clip : input.clips)
+    if (clip.weight != 1) add("clip " + clip.name + number(" weighs %.3g", clip.weight));
+  if (!list.empty())
+    result.notes.push_back("Weights: " + list +
+                           ". Intervals are those of observations whose variances are as many times larger.");
+}
+
 /// Residuals of one clip, its squares summed into `clip`.
 void add_clip(const TrackSet& tracks, const FitProblem& problem, const FitEvaluation& at, int number,
               FittedClip& clip, FitResult& result) {
@@ -279,6 +294,8 @@ void add_notes(const JointFitInput& input, JointProblem& problem, const VectorXd
     note_tracks_left_out(problem.clip(c), input.options, result);
     note_head_motion(problem.clip(c), result);
   }
+  note_weights(input, result);
+  for (const std::string& sentence : input.path_notes) result.notes.push_back(sentence);
   result.notes.push_back(
       "Each track is weighted by its own covariance in every frame; the error of its first pixel, which "
       "places "
@@ -334,9 +351,11 @@ void add_systematic_notes(const FitCase& options, FitResult& result) {
       if (!shift.failure.empty()) continue;
       if (shift.is_held()) {
         if (shift.shift[k] * shift.shift[k] > 0.5 * p.sigma * p.sigma)
-          result.cannot_tell.push_back(p.name + " hangs on a parameter that is held, " +
-                                       shift.name.substr(5) +
-                                       ": the table says what it moves. Fit it too, or measure it.");
+          result.cannot_tell.push_back(
+              shift.axes.empty() ? p.name + " hangs on a parameter that is held, " + shift.name.substr(5) +
+                                       ": the table says what it moves. Fit it too, or measure it."
+                                 : p.name + " hangs on how well the " + shift.name.substr(5) +
+                                       " is known: the table says what it moves. Measure it better.");
         continue;
       }
       finer += shift.shift[k] * shift.shift[k];

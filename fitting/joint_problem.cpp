@@ -35,8 +35,14 @@ void require_names(const std::vector<FitClip>& clips) {
   }
 }
 
+/// A parameter that moves several has them all or none.
+bool has_parameter(const Scene& scene, const FitParameter& p) {
+  return has_parameter(scene, p.moves.empty() ? p.address : p.moves.front().first);
+}
+
 /// What the first clip that has it says about a parameter, so that all clips mean the same by it.
 FitParameter complete(const FitParameter& given, const Scene& scene) {
+  if (!given.moves.empty()) return given;
   const ParameterSpec spec = describe_parameter(scene, given.address);
   FitParameter p = given;
   p.address = spec.address;
@@ -70,7 +76,7 @@ void JointProblem::choose_variables(const std::vector<FitClip>& clips, const Fit
     for (std::size_t c = 0; c < clips.size(); ++c) {
       const bool is_of_clip = given.clip.empty() || given.clip == clips[c].name;
       // The only clip says itself what is wrong with an address.
-      if (!is_of_clip || (clips.size() > 1 && !has_parameter(clips[c].scene, given.address))) continue;
+      if (!is_of_clip || (clips.size() > 1 && !has_parameter(clips[c].scene, given))) continue;
       if (clips.size() == 1) {
         parameters_[c].push_back(given);
         common = given;
@@ -100,6 +106,7 @@ void JointProblem::build_clips(const std::vector<FitClip>& clips, const FitCase&
   for (std::size_t c = 0; c < clips.size(); ++c) {
     FitCase of_clip = fit;
     of_clip.parameters = parameters_[c];
+    of_clip.clip_weight = clips[c].weight;
     try {
       clips_.emplace_back(clips[c].scene, of_clip, clips[c].cameras, clips[c].tracks, clips[c].measured);
     } catch (const InputError& error) {

@@ -30,6 +30,7 @@ struct FitClip {
   std::vector<Camera> cameras;
   TrackSet tracks;                         ///< of all cameras, by their names
   std::vector<Measurement> measured = {};  ///< what else was measured in the run
+  double weight = 1;                       ///< in (0, 1], of its tracks
 };
 
 /// "/clips/NAME/..." for a parameter of one clip, the address itself for a shared one.

@@ -99,7 +99,11 @@ Parametrisation::Parametrisation(const Scene& scene, const FitCase& fit) : scene
 }
 
 void Parametrisation::add_variable(const FitParameter& parameter) {
-  const ParameterSpec spec = describe_parameter(scene_, parameter.address);
+  ParameterSpec spec;
+  if (parameter.moves.empty())
+    spec = describe_parameter(scene_, parameter.address);
+  else
+    spec.address = parameter.address, spec.name = parameter.name, spec.unit = "σ";
   FitVariable v{.address = spec.address,
                 .name = spec.name,
                 .unit = spec.unit,
@@ -107,7 +111,8 @@ void Parametrisation::add_variable(const FitParameter& parameter) {
                 .initial = parameter.initial.value_or(spec.value),
                 .lower = parameter.lower.value_or(spec.lower),
                 .upper = parameter.upper.value_or(spec.upper),
-                .prior_sigma = parameter.prior_sigma};
+                .prior_sigma = parameter.prior_sigma,
+                .moves = parameter.moves};
   const std::string where = "fit: " + v.address;
   for (const FitVariable& other : variables_)
     if (other.address == v.address) throw InputError(where, "a second entry", "each address once");
@@ -120,10 +125,12 @@ void Parametrisation::add_variable(const FitParameter& parameter) {
                      "a value in " + number(v.lower) + ".." + number(v.upper));
   if (v.prior_sigma && !(*v.prior_sigma > 0))
     throw InputError(where, "prior_sigma " + number(*v.prior_sigma), "a positive number");
-  Scene trial = scene_;  // refuses bounds that no scene may hold
-  set_parameter(trial, v.address, v.lower);
-  set_parameter(trial, v.address, v.upper);
-  set_parameter(scene_, v.address, v.initial);
+  if (v.moves.empty()) {
+    Scene trial = scene_;  // refuses bounds that no scene may hold
+    set_parameter(trial, v.address, v.lower);
+    set_parameter(trial, v.address, v.upper);
+    set_parameter(scene_, v.address, v.initial);
+  }
   variables_.push_back(std::move(v));
 }
 
@@ -159,8 +166,14 @@ Scene Parametrisation::scene(const VectorXd& t) const {
   const VectorXd p = values(t);
   Scene scene = scene_;
   // exp and ln round: a bound must not be overstepped by the last bit.
-  for (int k = 0; k < size(); ++k)
-    set_parameter(scene, variables_[k].address, std::clamp(p[k], variables_[k].lower, variables_[k].upper));
+  for (int k = 0; k < size(); ++k) {
+    const FitVariable& v = variables_[k];
+    const double value = std::clamp(p[k], v.lower, v.upper);
+    if (v.moves.empty()) set_parameter(scene, v.address, value);
+    if (value == 0) continue;
+    for (const auto& [address, amount] : v.moves)
+      set_parameter(scene, address, get_parameter(scene, address) + amount * value);
+  }
   if (const int gauge = modulus_variable(gauge_layer_); gauge >= 0)
     for (const std::string& address : following_)
       set_parameter(scene, address, get_parameter(scene_, address) * p[gauge] / gauge_modulus_);
@@ -170,8 +183,16 @@ Scene Parametrisation::scene(const VectorXd& t) const {
 MatrixXd Parametrisation::native_directions(const SceneModel& model, const VectorXd& t) const {
   const Scene at = scene(t);
   MatrixXd directions(model.native().size(), size());
-  for (int k = 0; k < size(); ++k)
-    directions.col(k) = model.native_derivative(at, variables_[k].address) * variables_[k].derivative(t[k]);
+  for (int k = 0; k < size(); ++k) {
+    const FitVariable& v = variables_[k];
+    if (v.moves.empty())
+      directions.col(k) = model.native_derivative(at, v.address);
+    else
+      directions.col(k).setZero();
+    for (const auto& [address, amount] : v.moves)
+      directions.col(k) += amount * model.native_derivative(at, address);
+    directions.col(k) *= v.derivative(t[k]);
+  }
   if (const int gauge = modulus_variable(gauge_layer_); gauge >= 0)
     for (const std::string& address : following_)
       directions.col(gauge) += model.native_derivative(at, address) *

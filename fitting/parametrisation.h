@@ -13,6 +13,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fitting/case.h"
@@ -26,6 +27,8 @@ struct FitVariable {
   ParameterTransform transform = ParameterTransform::none;
   double initial = 0, lower = 0, upper = 0;
   std::optional<double> prior_sigma;  ///< of t, around the initial value
+  /// Addresses that move by so much per unit; empty: `address` is set itself.
+  std::vector<std::pair<std::string, double>> moves = {};
 
   double to_transformed(double p) const;
   double to_parameter(double t) const;

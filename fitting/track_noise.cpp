@@ -38,18 +38,21 @@ TrackNoise::TrackNoise(const Eigen::Matrix2d& first, const std::vector<Eigen::Ma
 }
 
 TrackNoise::TrackNoise(const Track& track, const std::vector<const Observation*>& used, double floor,
-                       double huber)
+                       double huber, const TrackWeights& weights)
     : huber_(huber) {
+  require(weights.frames.empty() || weights.frames.size() == used.size(), "TrackNoise: a weight for each");
   std::vector<Eigen::Matrix2d> later;
   std::vector<Renewal> renewals;
   const Observation* last = nullptr;  // the last ok one
   auto next = used.begin();
   for (const Observation& o : track.observations) {
     if (o.status != TrackStatus::ok) continue;
-    if (last == nullptr) shift_covariances_.push_back(with_floor(o.covariance, floor));
-    if (last != nullptr && o.renewed) renewals.push_back({static_cast<int>(later.size()), last->covariance});
+    if (last == nullptr) shift_covariances_.push_back(with_floor(o.covariance, floor) / weights.whole);
+    if (last != nullptr && o.renewed)
+      renewals.push_back({static_cast<int>(later.size()), last->covariance / weights.whole});
     if (last != nullptr && next != used.end() && *next == &o) {
-      later.push_back(with_floor(o.covariance, floor));
+      const double weight = weights.frames.empty() ? 1 : weights.frames[later.size()];
+      later.push_back(with_floor(o.covariance, floor) / (weight * weights.whole));
       ++next;
     }
     last = &o;

@@ -23,6 +23,13 @@
 
 namespace rhytid::fitting {
 
+/// What observations count less than their covariances say: variances are divided by it.
+struct TrackWeights {
+  std::vector<double> frames =
+      {};            ///< in (0, 1], of each observation used: of what its frame errs by itself; empty: 1
+  double whole = 1;  ///< in (0, 1], of everything
+};
+
 /// The noise model of one track. Immutable.
 class TrackNoise {
  public:
@@ -36,7 +43,9 @@ class TrackNoise {
              const std::vector<Renewal>& renewals = {});
   /// Of the observations `used` of a track, ok and after its first ok one, in order; the deviations of the
   /// first and of each are raised to at least `floor` px. Renewals count from the first on, used or not.
-  TrackNoise(const Track& track, const std::vector<const Observation*>& used, double floor, double huber);
+  /// Weights come on top of the floor.
+  TrackNoise(const Track& track, const std::vector<const Observation*>& used, double floor, double huber,
+             const TrackWeights& weights = {});
 
   int num_observations() const { return static_cast<int>(roots_.size()); }
   int num_shifts() const { return static_cast<int>(shift_covariances_.size()); }  ///< one and every renewal

@@ -96,6 +96,8 @@ MarkerFinding find_by_marker(const MarkerJob& job, const std::vector<fitting::La
     if (!frame.lost.empty()) continue;
     frame.found = of_marker.pose;
     frame.covariance = of_marker.covariance;
+    frame.own = of_marker.own;
+    frame.shared = of_marker.covariance - of_marker.own;
     frame.across_sigma = of_marker.across_sigma;
     frame.depth_sigma = of_marker.depth_sigma;
     frame.rms = of_marker.rms;

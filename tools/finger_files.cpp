@@ -82,10 +82,17 @@ std::string path_text(const std::vector<FingerFrame>& frames, bool turns) {
       const Eigen::Quaterniond q(f.found.rotation);
       for (const double part : {q.w(), q.x(), q.y(), q.z()}) text += "," + exact_text(part);
     }
+    for (const Mat3* covariance : {&f.own, &f.shared})
+      for (int a = 0; a < 3; ++a)
+        for (int b = a; b < 3; ++b) text += "," + short_text((*covariance)(a, b), 9);
     text += "\n";
   }
   if (text.empty()) return text;
-  return (turns ? "time,x,y,z,qw,qx,qy,qz\n" : "time,x,y,z\n") + text;
+  std::string header = turns ? "time,x,y,z,qw,qx,qy,qz" : "time,x,y,z";
+  for (const char* what : {"own", "shared"})
+    for (const char* pair : {"xx", "xy", "xz", "yy", "yz", "zz"})
+      header += std::string(",") + what + "_" + pair;
+  return header + "\n" + text;
 }
 
 FingerSummary summary_of(const std::vector<FingerFrame>& frames) {

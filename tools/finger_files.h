@@ -27,6 +27,8 @@ struct FingerFrame {
   std::string lost;                          ///< why nothing was found; empty: it was
   BodyPose found;                            ///< turned as the scene says unless that was found too
   Mat3 covariance = Mat3::Zero();            ///< of the centre, mm²
+  Mat3 own = Mat3::Zero();                   ///< of what this frame errs by itself, mm²
+  Mat3 shared = Mat3::Zero();                ///< of what all frames err alike, mm²
   double across_sigma = 0, depth_sigma = 0;  ///< mm, across and along the line of sight
   double rms = 0;                            ///< px, of what is left
   std::vector<FingerSign> signs;
@@ -41,7 +43,8 @@ cv::Mat drawn_finger(const cv::Mat& colour, const FingerFrame& frame, const fitt
 /// Pictures of one size as a PNG, two beside each other. At least one. Throws InputError naming `folder`.
 std::string tiled_png(std::vector<cv::Mat> pictures, const std::string& folder);
 
-/// As `path_file` reads it, rotations too if it `turns`. Empty when all frames are lost.
+/// As `path_file` reads it, rotations too if it `turns`, with the covariances that a fit reads
+/// (fitting/path_deviations.h). Empty when all frames are lost.
 std::string path_text(const std::vector<FingerFrame>& frames, bool turns);
 
 /// Over the frames that were found; distances are from the scene's path.

@@ -161,7 +161,7 @@ std::optional<fitting::JointFitInput> fit_input(const fitting::Case& c, const fi
   const std::vector<Scene> scenes = fitting::scenes_of(c);
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     fitting::FitClip& clip = input.clips.emplace_back();
-    if (!c.clips.empty()) clip.name = c.clips[k].name;
+    if (!c.clips.empty()) clip.name = c.clips[k].name, clip.weight = c.clips[k].weight;
     clip.scene = scenes[k];
     const std::string& measured = c.clips.empty() ? c.measurements : c.clips[k].measurements;
     if (!measured.empty()) clip.measured = fitting::read_measurements(measured);

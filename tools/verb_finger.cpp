@@ -96,7 +96,8 @@ class FingerVerb final : public Verb {
         "case.json with its footage, camera and scene; with --marker a CSV of name,x_px,y_px,x_mm,y_mm,z_mm, "
         "and maybe "
         "sigma_px",
-        "finger.csv (for /colliders/NAME/path_file), finger.json (deviations, edges or points used), "
+        "finger.csv (for /colliders/NAME/path_file; a fit takes its deviations into account), finger.json "
+        "(deviations, edges or points used), "
         "finger.png (four "
         "frames: blue the scene's outline, green the one found); with --marker finger_tracks.csv. Prints how "
         "far it is "
@@ -205,7 +206,9 @@ class FingerVerb final : public Verb {
           picture->colour, camera, frame.of_scene.centre + correction, collider.radius, {.window = window_});
       frame.lost = outline.lost;
       frame.found.centre = outline.centre;
-      frame.covariance = outline.covariance;
+      // Which part of it all frames share, pictures do not tell (a radius, the shade of a finger's rim): as much as
+      // they err by themselves, since that is what was found of known paths.
+      frame.covariance = frame.own = frame.shared = outline.covariance;
       frame.across_sigma = outline.across_sigma;
       frame.depth_sigma = outline.depth_sigma;
       frame.rms = outline.rms;

@@ -16,10 +16,24 @@ namespace {
 
 constexpr std::array<const char*, 8> kColumns{"time", "x", "y", "z", "qw", "qx", "qy", "qz"};
 
+/// Columns of deviations, which a fit reads (fitting/path_deviations.h) and a simulation does not need.
+bool is_deviation(const std::string& cell) {
+  for (const char* prefix : {"sigma_", "own_", "shared_"})
+    if (cell.starts_with(prefix)) return true;
+  return false;
+}
+
+/// What is no part of the path.
+constexpr std::size_t kPassedOver = kColumns.size();
+
 /// Which of kColumns each column of the file is.
 std::vector<std::size_t> read_header(const CsvLine& line) {
   std::vector<std::size_t> meaning;
   for (std::string cell : line.cells) {
+    if (is_deviation(cell)) {
+      meaning.push_back(kPassedOver);
+      continue;
+    }
     if (cell == "time_s") cell = "time";
     if (cell.size() == 4 && cell.ends_with("_mm")) cell = cell.substr(0, 1);
     const auto found = std::find(kColumns.begin(), kColumns.end(), cell);
@@ -29,6 +43,7 @@ std::vector<std::size_t> read_header(const CsvLine& line) {
     meaning.push_back(static_cast<std::size_t>(found - kColumns.begin()));
   }
   std::vector<std::size_t> sorted = meaning;
+  std::erase(sorted, kPassedOver);
   std::sort(sorted.begin(), sorted.end());
   const bool is_whole = sorted.size() == 4 || sorted.size() == 8;
   for (std::size_t k = 0; k < sorted.size(); ++k)
@@ -58,7 +73,7 @@ std::vector<PathKnot> read_path(const std::string& file) {
       return;
     }
     require_cells_as_in_header(line, meaning.size());
-    std::array<double, 8> value{0, 0, 0, 0, 1, 0, 0, 0};
+    std::array<double, kPassedOver + 1> value{0, 0, 0, 0, 1, 0, 0, 0, 0};
     for (std::size_t k = 0; k < line.cells.size(); ++k)
       value[meaning[k]] = csv_number(line.cells[k], line.place);
     const Eigen::Quaterniond q(value[4], value[5], value[6], value[7]);

@@ -104,7 +104,8 @@ TEST_F(CaseTest, QuantitiesTakeTheUnitOfTheirParameter) {
     "truth": {"settings": ["/skin/layers/film/youngs_modulus=2 MPa"]},
     "render": {"texture_scale": "300 um", "tilt": "0 deg"},
     "track": {"roi": [1, 2, 30, 40]},
-    "fit": {"rim_margin": "1 cm", "gauge_layer": "film", "parameters": [
+    "fit": {"rim_margin": "1 cm", "gauge_layer": "film", "path_deviations": "fit",
+      "frame_weights": [{"from": 4, "weight": 0.5, "half_every": 1}], "parameters": [
       {"address": "/skin/layers/1/youngs_modulus", "initial": "500 kPa", "lower": "1 kPa", "upper": 3,
        "transform": "logit", "prior_sigma": 0.7},
       {"address": "/colliders/finger/friction/coefficient", "initial": 0.3}]}})"));
@@ -118,6 +119,9 @@ TEST_F(CaseTest, QuantitiesTakeTheUnitOfTheirParameter) {
   EXPECT_EQ(film.prior_sigma, 0.7);
   EXPECT_FALSE(c.fit.parameters[1].lower);
   EXPECT_EQ(c.fit.rim_margin, 10);
+  EXPECT_EQ(c.fit.path_deviations, "fit");
+  ASSERT_EQ(c.fit.frame_weights.size(), 1u);
+  EXPECT_EQ(frame_weight(c.fit.frame_weights, 5), 0.25);
   EXPECT_EQ(c.render.texture_scale, 0.3);
   EXPECT_EQ(c.render.tilt, 0);
   EXPECT_EQ(c.track.roi, (std::array<double, 4>{1, 2, 30, 40}));
@@ -151,6 +155,8 @@ TEST_F(CaseTest, WrongCasesAreRefusedWithPlaceAndRemedy) {
   EXPECT_THAT(parameter(R"({"address": "/skin/layers/film/youngs_modulus"},
                            {"address": "/skin/layers/1/youngs_modulus"})"),
               AllOf(HasSubstr("/fit/parameters/1/address"), HasSubstr("a second time")));
+  EXPECT_THAT(error_of(R"({"scene": "scene.json", "fit": {"frame_weights": [{"from": 4, "to": 3}]}})"),
+              AllOf(HasSubstr("/fit/frame_weights/0/to"), HasSubstr("at least from, 4")));
   EXPECT_THAT(error_of(R"({"scene": "scene.json", "fit": {"gauge_layer": "flim"}})"),
               HasSubstr("nearest is \"film\""));
 }

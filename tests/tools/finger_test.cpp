@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fitting/cameras.h"
+#include "fitting/path_deviations.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/collider_motion.h"
 #include "sim/scene/load.h"
@@ -91,6 +92,11 @@ TEST_F(Finger, IsFoundFromHalfAMillimetreBesideOrLost) {
 
   const std::vector<PathKnot> knots = read_path(path("found/finger.csv"));
   ASSERT_EQ(knots.size(), 7u);
+  const auto known = fitting::read_path_deviations(path("found/finger.csv"));
+  ASSERT_TRUE(known) << "a fit reads them from there";
+  ASSERT_EQ(known->own.size(), 7u);
+  EXPECT_GT(known->own[0].trace(), 0);
+  EXPECT_GT(known->shared.trace(), 0);
   const ColliderMotion motion(truth.colliders[0], 0);
   const fitting::Camera camera = fitting::read_camera(path("out/camera.yaml"));
   double across = 0, depth = 0;

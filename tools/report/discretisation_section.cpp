@@ -24,10 +24,14 @@ std::string signed_text(double value, int digits) {
   return (value < 0 ? "−" : "+") + short_text(std::abs(value), digits);
 }
 
-std::string moved(const FittedParameter& p, double shift) {
+std::string moved(const FittedParameter& p, const SystematicShift& d, std::size_t k) {
+  const double shift = d.shift[k];
   if (!p.determined && std::abs(shift) > 1) return "–";
-  if (p.transform == "log") return signed_text(100 * std::expm1(shift), 2) + " %";
-  return signed_text(shift, 3) + (p.transform == "none" ? " " + p.unit : "");
+  const auto text = [&d](double value, int digits) {
+    return d.axes.empty() ? signed_text(value, digits) : "±" + short_text(value, digits);
+  };
+  if (p.transform == "log") return text(100 * std::expm1(shift), 2) + " %";
+  return text(shift, 3) + (p.transform == "none" ? " " + p.unit : "");
 }
 
 void add_bars(HtmlPage& page, const FitResult& fit, const std::vector<const SystematicShift*>& run) {
@@ -83,7 +87,7 @@ void add_discretisation(HtmlPage& page, const ReportData& data) {
   for (const SystematicShift* d : run) table.header.push_back(d->name);
   for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
     std::vector<TableCell> row = {fit.parameters[k].name};
-    for (const SystematicShift* d : run) row.emplace_back(moved(fit.parameters[k], d->shift[k]));
+    for (const SystematicShift* d : run) row.emplace_back(moved(fit.parameters[k], *d, k));
     table.rows.push_back(std::move(row));
   }
   page.table(table);

@@ -65,7 +65,9 @@ void add_run_facts(HtmlPage& page, const ReportData& data) {
     if (!data.fit.optimiser.empty())
       commands += " --optimiser " + data.fit.optimiser.substr(0, data.fit.optimiser.find(' '));
     std::string addresses;
-    for (const auto& p : data.fit.parameters) addresses += (addresses.empty() ? "" : ",") + p.address;
+    for (const auto& p : data.fit.parameters)
+      if (p.address.find("/path/offset/") == std::string::npos)  // the fit adds these by itself
+        addresses += (addresses.empty() ? "" : ",") + p.address;
     if (!addresses.empty()) commands += " --parameters " + shell_word(addresses);
     for (const std::string& setting : data.fit.settings) commands += " --set " + shell_word(setting);
     commands += "\n";

@@ -1,0 +1,247 @@
+#include "fitting/path_deviations.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "sim/core/csv_reader.h"
+#include "sim/core/error.h"
+
+namespace rhytid::fitting {
+namespace {
+
+/// Deviations below this count as none, mm: no run of a simulation is that exact.
+constexpr double kLeastSigma = 1e-7;
+/// Bounds of a fitted offset, in its own deviations.
+constexpr double kReach = 8;
+
+constexpr std::array<std::pair<int, int>, 6> kPairs{{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
+
+/// Columns of a symmetric matrix, "own_xx" to "own_zz".
+std::vector<std::string> columns_of(const std::string& prefix) {
+  std::vector<std::string> names;
+  for (const auto& [a, b] : kPairs) names.push_back(prefix + "_" + "xyz"[a] + "xyz"[b]);
+  return names;
+}
+
+/// Where the columns are in the header; empty when there are none of them. Throws InputError for a part of them.
+std::vector<std::size_t> find_columns(const CsvLine& header, const std::vector<std::string>& names) {
+  std::vector<std::size_t> at;
+  for (const std::string& name : names) {
+    const auto found = std::find_if(header.cells.begin(), header.cells.end(), [&](const std::string& cell) {
+      return cell == name || cell == name + "_mm" || cell == name + "_mm2";
+    });
+    if (found != header.cells.end()) at.push_back(static_cast<std::size_t>(found - header.cells.begin()));
+  }
+  if (!at.empty() && at.size() != names.size())
+    throw InputError(header.place, "only some of the columns " + names.front() + " to " + names.back(),
+                     "all " + std::to_string(names.size()) + " of them, or none");
+  return at;
+}
+
+Mat3 covariance_in(const CsvLine& line, const std::vector<std::size_t>& columns, const std::string& what) {
+  Mat3 covariance = Mat3::Zero();
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const auto [a, b] = kPairs[k];
+    covariance(a, b) = covariance(b, a) = csv_number(line.cells[columns[k]], line.place);
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(covariance, Eigen::EigenvaluesOnly);
+  if (eigen.eigenvalues()[0] < -1e-6 * std::fabs(eigen.eigenvalues()[2]) - 1e-12)
+    throw InputError(line.place, what + " columns that are no covariance",
+                     "a matrix without negative variances");
+  return covariance;
+}
+
+Mat3 squares_in(const CsvLine& line, const std::vector<std::size_t>& columns) {
+  Vec3 sigma;
+  for (int a = 0; a < 3; ++a) {
+    sigma[a] = csv_number(line.cells[columns[static_cast<std::size_t>(a)]], line.place);
+    if (sigma[a] < 0)
+      throw InputError(line.place, std::to_string(sigma[a]) + " mm", "a deviation that is not negative");
+  }
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+/// √λ v of the axes along which a place may be off.
+std::vector<Vec3> axes_of(const Mat3& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(covariance);
+  std::vector<Vec3> axes;
+  for (int a = 2; a >= 0; --a)
+    if (eigen.eigenvalues()[a] > kLeastSigma * kLeastSigma)
+      axes.emplace_back(std::sqrt(eigen.eigenvalues()[a]) * eigen.eigenvectors().col(a));
+  return axes;
+}
+
+double largest_sigma(const Mat3& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+}
+
+std::string two_digits(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2g", x);
+  return text;
+}
+
+/// Knots that a run of so many frames can see: a spline looks beyond its next knot, hardly beyond the one after.
+std::size_t knots_seen(const ColliderScene& collider, const TimeScene& time, int last_frame) {
+  const double end = last_frame / time.frame_rate + time.offset;
+  std::size_t count = 0;
+  while (count < collider.path.size() && collider.path[count].time < end) ++count;
+  count += collider.interpolation == PathKind::linear ? 1 : 2;
+  return std::min(count, collider.path.size());
+}
+
+/// All modes of one collider's path, of `clip`.
+class PathModes {
+ public:
+  PathModes(const ColliderScene& collider, std::string clip, std::size_t knots, const PathDeviations& known)
+      : collider_(collider), clip_(std::move(clip)) {
+    for (const Vec3& axis : axes_of(known.shared)) add_shared(axis);
+    for (std::size_t k = 0; k < knots; ++k)
+      for (const Vec3& axis : axes_of(known.own[k])) {
+        FitParameter& p = parameter("knot_error/" + std::to_string(own.size()), own);
+        p.group = group() + " by knot";
+        add(axis, k, p);
+      }
+  }
+  std::vector<FitParameter> shared, own;
+
+  std::string group() const { return collider_.name + " path" + (clip_.empty() ? "" : " (" + clip_ + ")"); }
+
+ private:
+  void add_shared(const Vec3& axis) {
+    FitParameter& p = parameter("offset/" + std::to_string(shared.size()), shared);
+    p.group = group() + ", all alike";
+    Eigen::Index along = 0;
+    axis.cwiseAbs().maxCoeff(&along);
+    p.group = group() + " offset";
+    p.name = collider_.name + " path offset " + std::to_string(shared.size()) + " (" +
+             two_digits(axis.norm()) + " mm, mostly " + "xyz"[along] + ")";
+    for (std::size_t k = 0; k < collider_.path.size(); ++k) add(axis, k, p);
+  }
+  FitParameter& parameter(const std::string& what, std::vector<FitParameter>& list) const {
+    FitParameter& p = list.emplace_back();
+    p.address = "/colliders/" + collider_.name + "/path/" + what;
+    p.name = collider_.name + " path " + what;
+    p.clip = clip_;
+    p.initial = 0, p.lower = -kReach, p.upper = kReach, p.transform = ParameterTransform::none;
+    p.prior_sigma = 1;
+    return p;
+  }
+  void add(const Vec3& axis, std::size_t knot, FitParameter& p) const {
+    for (int a = 0; a < 3; ++a)
+      if (axis[a] != 0)
+        p.moves.emplace_back("/colliders/" + collider_.name + "/path/" + std::to_string(knot) + "/position/" +
+                                 std::to_string(a),
+                             axis[a]);
+  }
+
+  const ColliderScene& collider_;
+  std::string clip_;
+};
+
+/// Paths that are parameters of the scene: the files of colliders that `input.path_errors` or fitted offsets move.
+void release(const std::vector<FitParameter>& modes, const std::string& clip, Scene& scene) {
+  for (ColliderScene& collider : scene.colliders)
+    for (const FitParameter& p : modes)
+      if (!p.moves.empty() && (p.clip.empty() || p.clip == clip) &&
+          p.address.starts_with("/colliders/" + collider.name + "/path/"))
+        collider.path_file.clear();
+}
+
+}  // namespace
+
+std::optional<PathDeviations> read_path_deviations(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw InputError(file, "a file that cannot be read", "a readable path (CSV)");
+  PathDeviations found;
+  std::vector<std::size_t> own, shared, sigma;
+  bool has_header = false;
+  for_csv_lines(in, file, [&](const CsvLine& line) {
+    if (!has_header) {
+      has_header = true;
+      own = find_columns(line, columns_of("own"));
+      shared = find_columns(line, columns_of("shared"));
+      sigma = find_columns(line, {"sigma_x", "sigma_y", "sigma_z"});
+      if (!own.empty() && !sigma.empty())
+        throw InputError(line.place, "columns own_.. and sigma_..", "one of the two");
+      return;
+    }
+    if (own.empty() && shared.empty() && sigma.empty()) return;
+    found.own.push_back(!sigma.empty() ? squares_in(line, sigma) : covariance_in(line, own, "own_.."));
+    found.shared += covariance_in(line, shared, "shared_..");
+  });
+  if (found.own.empty()) return std::nullopt;
+  found.shared /= static_cast<double>(found.own.size());
+  return found;
+}
+
+JointFitInput with_path_errors(const JointFitInput& input) {
+  JointFitInput out = input;
+  if (input.options.path_deviations != "consider" && input.options.path_deviations != "fit" &&
+      input.options.path_deviations != "ignore")
+    throw InputError("fit: path_deviations", "'" + input.options.path_deviations + "'",
+                     "consider, fit or ignore");
+  const bool fits = input.options.path_deviations == "fit";
+  std::vector<FitParameter> fitted;
+  for (const FitClip& clip : input.clips) {
+    const std::string of_clip = input.clips.size() > 1 ? clip.name : "";
+    const int last = input.options.last_frame > 0 ? std::min(input.options.last_frame, clip.scene.time.frames)
+                                                  : clip.scene.time.frames;
+    for (const ColliderScene& collider : clip.scene.colliders) {
+      if (collider.path_file.empty()) continue;
+      const std::string file = std::filesystem::path(collider.path_file).filename().string();
+      const std::string which =
+          "The path of " + collider.name + (of_clip.empty() ? "" : " in clip " + of_clip) + " (" + file + ")";
+      const std::optional<PathDeviations> known = read_path_deviations(collider.path_file);
+      if (!known) {
+        out.path_notes.push_back(which + " states no deviations: it is taken for exact.");
+        continue;
+      }
+      double own = 0;
+      for (const Mat3& of_knot : known->own) own = std::max(own, largest_sigma(of_knot));
+      const std::string size = " is known to " + two_digits(largest_sigma(known->shared)) +
+                               " mm for all knots alike and to " + two_digits(own) +
+                               " mm for each by itself (the largest deviations in any direction): ";
+      if (input.options.path_deviations == "ignore") {
+        out.path_notes.push_back(which + size + "not used, as the case asks (/fit/path_deviations).");
+        continue;
+      }
+      if (known->own.size() != collider.path.size())  // the file has changed since the scene was read
+        throw InputError(collider.path_file, std::to_string(known->own.size()) + " knots",
+                         std::to_string(collider.path.size()) + " as the scene has");
+      PathModes modes(collider, of_clip, knots_seen(collider, clip.scene.time, last), *known);
+      const bool fits_here = fits && !modes.shared.empty();
+      out.path_notes.push_back(which + size +
+                               (fits_here ? "the offset is fitted with that as its prior, what knots err by "
+                                            "themselves is in the intervals."
+                                          : "what that would move is in the intervals."));
+      auto& of_shared = fits_here ? fitted : out.path_errors;
+      of_shared.insert(of_shared.end(), modes.shared.begin(), modes.shared.end());
+      out.path_errors.insert(out.path_errors.end(), modes.own.begin(), modes.own.end());
+    }
+  }
+  if (fitted.empty()) return out;
+  for (std::size_t c = 0; c < out.clips.size(); ++c) {
+    const std::string of_clip = out.clips.size() > 1 ? out.clips[c].name : "";
+    release(fitted, of_clip, out.clips[c].scene);
+    for (std::vector<Scene>& stage : out.stages) release(fitted, of_clip, stage[c]);
+  }
+  for (FitParameter& p : fitted) {
+    p.group.clear();
+    out.options.parameters.push_back(std::move(p));
+  }
+  return out;
+}
+
+void release_paths(JointFitInput& input) {
+  for (FitClip& clip : input.clips)
+    release(input.path_errors, input.clips.size() > 1 ? clip.name : "", clip.scene);
+}
+
+}  // namespace rhytid::fitting

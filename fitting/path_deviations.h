@@ -1,0 +1,43 @@
+// How well a measured path of a collider is known, and what that means for a fit.
+//
+// A path_file may say it for every knot, in columns behind its places (`rhytid finger` writes them):
+//   own_xx, own_xy, own_xz, own_yy, own_yz, own_zz   mm²  covariance of what this knot errs by itself
+//   shared_xx, ...                                   mm²  of what all knots err alike; the mean over the knots counts
+//   sigma_x, sigma_y, sigma_z                        mm   in place of own_..: deviations that are independent
+//
+// A path is then off by   e_f = Σ_a s_a √λ_a v_a + Σ_b w_fb √λ_fb v_fb,   s_a, w_fb ~ N(0, 1) independent,
+// with the principal axes v of the shared covariance and of those of the knots. Each s and w is a parameter that moves
+// knots of the scene. By default all are considered (consider.h); with /fit/path_deviations `fit` the s are fitted with
+// their prior, since all frames together tell more of a common offset than the finger's own picture did.
+//
+// Paths of several clips count as independent, from the same file too. How the finger turns, and where it is between
+// knots, counts as known.
+//
+// Tests: tests/fitting/path_deviations_test.cpp
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fitting/fit.h"
+
+namespace rhytid::fitting {
+
+struct PathDeviations {
+  Mat3 shared = Mat3::Zero();  ///< mm²
+  std::vector<Mat3> own;       ///< mm², by knot
+};
+
+/// What a path_file states; nothing when it has no such columns. Throws InputError "file:line" for a part of the columns
+/// only, and for what is no covariance.
+std::optional<PathDeviations> read_path_deviations(const std::string& file);
+
+/// The input with `path_errors` of all colliders whose path_file states deviations, up to the last frame that is
+/// compared, those that are to be fitted among the parameters instead, and `path_notes` about them.
+JointFitInput with_path_errors(const JointFitInput& input);
+
+/// Makes the knots of the clips whose paths may be off parameters of their scenes: they are no longer those of a file.
+void release_paths(JointFitInput& input);
+
+}  // namespace rhytid::fitting
