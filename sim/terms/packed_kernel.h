@@ -118,7 +118,7 @@ struct PackedKernel {
           for (int c = 0; c < 3; ++c) a[3 * c + i][3 * c + j] += s;
         }
       const int count = v.num_points - first < kLanes ? v.num_points - first : kLanes;
-      if (projected) project(a, count);
+      if (projected) project(a);
       natural_blocks(a, p.jacobian, p.weight, blocks.pack(first));
       blocks.add_pack(first, count);
     }
@@ -179,16 +179,11 @@ struct PackedKernel {
         }
   }
 
-  /// Of a only the blocks a ≤ b are there.
-  static void project(Lanes (*a)[nz], int count) {
-    for (int k = 0; k < count; ++k) {
-      double one[nz][nz];
-      for (int i = 0; i < nz; ++i)
-        for (int j = 0; j < nz; ++j) one[i][j] = i / 3 <= j / 3 ? a[i][j][k] : a[j][i][k];
-      project_psd<nz>(one);
-      for (int i = 0; i < nz; ++i)
-        for (int j = 0; j < nz; ++j) a[i][j][k] = one[i][j];
-    }
+  /// Of a only the blocks a ≤ b are there; afterwards all are.
+  [[gnu::noinline]] static void project(Lanes (*a)[nz]) {
+    for (int i = 1; i < nz; ++i)
+      for (int j = 0; j < i; ++j) a[i][j] = a[j][i];
+    project_psd<nz>(a);
   }
 };
 

@@ -124,6 +124,50 @@ TEST(Jacobi, ProjectionIsNearestPositiveSemidefinite) {
   }
 }
 
+TEST(Jacobi, PacksAreProjectedLaneByLane) {
+  std::mt19937 rng(10);
+  std::normal_distribution<double> n;
+  for (int draw = 0; draw < 20; ++draw) {
+    Lanes pack[9][9];
+    double one[kLanes][9][9];
+    for (int lane = 0; lane < kLanes; ++lane) {
+      // By turns indefinite, positive definite, of rank 4, diagonal, zero.
+      double factor[9][9];
+      for (auto& row : factor)
+        for (double& entry : row) entry = n(rng);
+      const int kind = (draw + lane) % 5, rank = kind == 2 ? 4 : 9;
+      for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 9; ++j) {
+          double sum = 0;
+          for (int k = 0; k < rank; ++k) sum += factor[i][k] * factor[j][k];
+          if (kind == 0) sum = factor[i][j] + factor[j][i];
+          if (kind == 3) sum = i == j ? factor[i][i] : 0;
+          if (kind == 4) sum = 0;
+          one[lane][i][j] = pack[i][j][lane] = sum;
+        }
+    }
+    project_psd<9>(pack);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      double scale = 1e-300;
+      for (const auto& row : one[lane])
+        for (const double entry : row) scale = std::max(scale, std::fabs(entry));
+      project_psd<9>(one[lane]);
+      for (int i = 0; i < 9; ++i)
+        for (int j = 0; j < 9; ++j) EXPECT_NEAR(pack[i][j][lane], one[lane][i][j], 1e-13 * scale);
+    }
+  }
+}
+
+TEST(Jacobi, LeavesSemidefiniteMatricesAsTheyAre) {
+  double a[9][9] = {};
+  for (int i = 0; i < 9; ++i)
+    for (int j = 0; j < 9; ++j) a[i][j] = (i + 1) * (j + 1) + (i == j && i > 3 ? 1e-3 : 0.0);
+  double before[9][9];
+  std::memcpy(before, a, sizeof a);
+  project_psd<9>(a);
+  EXPECT_EQ(std::memcmp(before, a, sizeof a), 0);
+}
+
 TEST(Cubic, FirstRootAlongADirection) {
   const double f[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, d[9] = {-2, 0, 0, 0, 0.5, 0, 0, 0, 0};
   double c[4];
