@@ -15,7 +15,7 @@ namespace rhytid {
 
 enum class Minimiser {
   newton,  ///< raw Hessian; per-point projected one for two iterations when it is not positive definite; its factor
-           ///< is kept while steps with it converge fast (kKeepAfter)
+           ///< is kept while steps with it converge fast (kKeepWhile)
   newton_projected,  ///< always projected (baseline)
   lbfgs,             ///< L-BFGS over a projected factor, then Newton for the certificate
   lbfgs_literal,     ///< L-BFGS to its end as published: no Newton, hence no certificate and no polish
@@ -31,13 +31,13 @@ enum class FactorPrecision {
 /// Below it assembly costs more than the factor does, and what a float factor saves is not worth its risk.
 inline constexpr double kMixedFromFlops = 2e9;
 /// A direction from a factor in single precision: Newton's to this relative residual, in at most so many solves.
-inline constexpr double kDirectionTolerance = 1e-7;
+inline constexpr double kDirectionTolerance = 1e-3;
 inline constexpr int kMaxCorrections = 12;
 
-/// After a step of Newton's that left at most kKeepAfter of the residual, the factor is kept for steps of L-BFGS as long as
-/// each leaves at most kKeepWhile of it, at the first trial: they cost an evaluation and a solve where a new Hessian and its factor cost several
-/// times that.
-inline constexpr double kKeepAfter = 0.1, kKeepWhile = 0.3;
+/// After a whole step of Newton's that lowered the residual, the factor is kept for steps of L-BFGS as long as each leaves
+/// at most this share of it, at the first trial: they cost an evaluation and a solve where a new Hessian and its factor
+/// cost some ten times that and leave a tenth of the residual or less, so that slower ones would not pay.
+inline constexpr double kKeepWhile = 0.6;
 
 struct MinimiserOptions {
   Minimiser method = Minimiser::newton;
@@ -46,7 +46,7 @@ struct MinimiserOptions {
   double absolute_tolerance = 1e-10;  ///< N
   int max_iterations = 200;
   FactorPrecision precision = FactorPrecision::automatic;
-  bool keep_factor = true;  ///< of `newton`: see kKeepAfter; such steps count as iterations too
+  bool keep_factor = true;  ///< of `newton`: see kKeepWhile; such steps count as iterations too
   int lbfgs_memory = 20;
   int lbfgs_refresh = 20;  ///< iterations between factorisations
   bool certify_minimum =
