@@ -298,8 +298,8 @@ MinimiserStatus Minimisation::newton() {
     }
     failures = 0;
     shift_ = kShift;
-    const bool keep = options_.keep_factor && raw && found.step == 1 &&
-                      found.next.gradient.norm() <= report_.residual;
+    const bool keep =
+        options_.keep_factor && raw && found.step == 1 && found.next.gradient.norm() <= report_.residual;
     LbfgsMemory memory(options_.lbfgs_memory);
     if (keep) memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);
     if (const auto stop = accept(std::move(found.next))) return *stop;
