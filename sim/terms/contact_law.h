@@ -34,45 +34,68 @@
 namespace rhytid {
 inline namespace RHYTID_ISA {
 
-/// Gap and gradient (in world axes) at a point, for any scalar, through the shape's second-order jet.
-template <class T>
-struct LiftedGap {
-  T gap;
-  T gradient[3];
-  bool supported;
-  bool inside;  ///< unsupported only: behind the nearest sample, i.e. hopelessly deep
+/// A shape's gap at a point, in plain numbers.
+struct GapAt {
+  Vec3 x;  ///< in the shape's axes, where it was asked
+  GapJet jet;
+  SizeDerivatives by_size;  ///< only of a shape that has sizes
+  bool inside;              ///< unsupported only: behind the nearest sample, i.e. hopelessly deep
 };
 
 /// Gap at X + u of a shape at c with orientation q; `size` [sizes]: of a shape that has three.
 template <int sizes, class T>
-LiftedGap<T> lift_gap(const ImplicitShape& shape, const T* u, const double* rest, const T* c, const T* q,
+GapAt gap_at(const ImplicitShape& shape, const T* u, const double* rest, const T* c, const T* q,
+             const T* size) {
+  double turn[4], world[3], local[3];
+  for (int i = 0; i < 4; ++i) turn[i] = value_of(q[i]);
+  for (int i = 0; i < 3; ++i) world[i] = value_of(u[i]) + rest[i] - value_of(c[i]);
+  Rotation<double>(turn).to_local(world, local);
+  GapAt at;
+  at.x = Vec3(local[0], local[1], local[2]);
+  if constexpr (sizes > 0)
+    at.jet =
+        shape.evaluate_sized(at.x, Vec3(value_of(size[0]), value_of(size[1]), value_of(size[2])), at.by_size);
+  else
+    at.jet = shape.evaluate(at.x);
+  at.inside = !at.jet.supported && shape.behind(at.x);
+  return at;
+}
+
+/// Gap and gradient (in world axes) for any scalar, through the shape's second-order jet.
+template <class T>
+struct LiftedGap {
+  T gap;
+  T gradient[3];
+};
+
+/// The same point as `at` with the derivatives of u, c, q and size.
+template <int sizes, class T>
+LiftedGap<T> lift_gap(const GapAt& at, const T* u, const double* rest, const T* c, const T* q,
                       const T* size) {
   const Rotation<T> rotation(q);
   const T world[3] = {u[0] + rest[0] - c[0], u[1] + rest[1] - c[1], u[2] + rest[2] - c[2]};
   T x[3], gradient[3];
   rotation.to_local(world, x);
-  const Vec3 x0(value_of(x[0]), value_of(x[1]), value_of(x[2]));
-  GapJet jet;
-  SizeDerivatives by_size;
-  if constexpr (sizes > 0)
-    jet = shape.evaluate_sized(x0, Vec3(value_of(size[0]), value_of(size[1]), value_of(size[2])), by_size);
-  else
-    jet = shape.evaluate(x0);
   LiftedGap<T> r;
-  r.supported = jet.supported;
-  r.inside = !jet.supported && shape.behind(x0);
-  const T dx[3] = {x[0] - x0[0], x[1] - x0[1], x[2] - x0[2]};
+  const GapJet& jet = at.jet;
+  const T dx[3] = {x[0] - at.x[0], x[1] - at.x[1], x[2] - at.x[2]};
   r.gap = T(jet.gap) + dx[0] * jet.gradient[0] + dx[1] * jet.gradient[1] + dx[2] * jet.gradient[2];
   for (int i = 0; i < 3; ++i)
     gradient[i] = T(jet.gradient[i]) + dx[0] * jet.hessian(i, 0) + dx[1] * jet.hessian(i, 1) +
                   dx[2] * jet.hessian(i, 2);
   for (int k = 0; k < sizes; ++k) {
     const T change = size[k] - value_of(size[k]);
-    r.gap += change * by_size.gap[k];
-    for (int i = 0; i < 3; ++i) gradient[i] += change * by_size.gradient(i, k);
+    r.gap += change * at.by_size.gap[k];
+    for (int i = 0; i < 3; ++i) gradient[i] += change * at.by_size.gradient(i, k);
   }
   rotation.to_world(gradient, r.gradient);
   return r;
+}
+
+/// Whether a point touches: the depth ΔR + g₀ − gap is positive. Asked in plain numbers, before any derivative is
+/// computed, since most points do not.
+inline bool touches(const GapAt& at, double inflation, double rest_gap) {
+  return at.jet.supported && inflation + rest_gap - at.jet.gap > 0;
 }
 
 /// `sizes` 0: the shape is what it is. 3: its sizes are the last parameters.
@@ -101,10 +124,11 @@ struct SizedContactLaw {
   template <class T>
   T stress(const T* u, const T*, const T* theta, const double* rest, double, T* traction) const {
     for (int i = 0; i < 3; ++i) traction[i] = T(0.0);
-    const LiftedGap<T> g = lift_gap<sizes>(*shape, u, rest, theta + 2, theta + 5, theta + 9);
-    if (!g.supported) return T(g.inside ? std::numeric_limits<double>::infinity() : 0.0);
+    const GapAt at = gap_at<sizes>(*shape, u, rest, theta + 2, theta + 5, theta + 9);
+    if (!at.jet.supported) return T(at.inside ? std::numeric_limits<double>::infinity() : 0.0);
+    if (!touches(at, value_of(theta[1]), rest[3])) return T(0.0);
+    const LiftedGap<T> g = lift_gap<sizes>(at, u, rest, theta + 2, theta + 5, theta + 9);
     const T depth = theta[1] + rest[3] - g.gap;
-    if (!(value_of(depth) > 0)) return T(0.0);
     T slope;
     const T energy = penalty(theta[0], depth, onset, slope);
     for (int i = 0; i < 3; ++i) traction[i] = -slope * g.gradient[i];
@@ -137,10 +161,9 @@ struct SizedContactLaw {
 
   static constexpr std::array<const char*, 3> regime_names = {"apart", "onset", "pressed"};
   signed char regime(const double* u, const double*, const double* theta, const double* rest, double) const {
-    const LiftedGap<double> g = lift_gap<sizes>(*shape, u, rest, theta + 2, theta + 5, theta + 9);
-    const double depth = theta[1] + rest[3] - g.gap;
-    if (!g.supported || !(depth > 0)) return 0;
-    return depth < onset ? 1 : 2;
+    const GapAt at = gap_at<sizes>(*shape, u, rest, theta + 2, theta + 5, theta + 9);
+    if (!touches(at, theta[1], rest[3])) return 0;
+    return theta[1] + rest[3] - at.jet.gap < onset ? 1 : 2;
   }
 };
 
@@ -215,10 +238,10 @@ struct SizedFrictionLaw {
   void update(const T* u, const T*, const T* theta, const double* rest, double, T* lag) const {
     using std::sqrt;
     for (int i = 0; i < 4; ++i) lag[i] = T(i == 3 ? 1.0 : 0.0);
-    const LiftedGap<T> g = lift_gap<sizes>(*shape, u, rest, theta + 3, theta + 9, theta + 17);
-    if (!g.supported) return;
+    const GapAt at = gap_at<sizes>(*shape, u, rest, theta + 3, theta + 9, theta + 17);
+    if (!touches(at, value_of(theta[1]), rest[3])) return;
+    const LiftedGap<T> g = lift_gap<sizes>(at, u, rest, theta + 3, theta + 9, theta + 17);
     const T depth = theta[1] + rest[3] - g.gap;
-    if (!(value_of(depth) > 0)) return;
     T slope;
     (void)ContactLaw::penalty(theta[0], depth, onset, slope);
     const T length =
