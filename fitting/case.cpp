@@ -34,7 +34,7 @@ RenderCase read_render(const json& j) {
 TrackCase read_track(const json& j) {
   TrackCase c;
   c.max_tracks = j["max_tracks"], c.min_distance = j["min_distance"], c.mask_finger = j["mask_finger"];
-  c.model = j["model"], c.window = j["window"];
+  c.model = j["model"], c.window = j["window"], c.redetect = j["redetect"];
   if (j.contains("roi")) c.roi = j["roi"].get<std::array<double, 4>>();
   return c;
 }

@@ -67,6 +67,7 @@ struct TrackCase {
   bool mask_finger = true;                   ///< drop tracks that the projected colliders of the scene cover
   std::string model = "affine";              ///< affine | translation: warp of the window about a point
   int window = 21;                           ///< px, odd: side of the window about a point
+  bool redetect = true;                      ///< look for points that were covered or lost
 };
 
 /// A cheaper fit before the fit (stages.h).

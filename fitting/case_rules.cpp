@@ -242,6 +242,10 @@ std::vector<Rule> track_rules() {
        .doc =
            "Side of the window about a point that is followed, px; odd. A small one resolves finer motion, a "
            "large one is surer where texture is weak."},
+      {.pointer = "/track/redetect",
+       .type = RuleType::boolean,
+       .fallback = c.redetect,
+       .doc = "Whether points that were covered or lost are looked for in later frames."},
       {.pointer = "/track/model",
        .type = RuleType::option,
        .fallback = c.model,

@@ -70,6 +70,7 @@ MarkerFinding find_by_marker(const MarkerJob& job, const std::vector<fitting::La
   options.seeds.seeding = fitting::Seeding::points;
   for (const fitting::Landmark& l : marker) options.seeds.points.push_back(l.pixel);
   options.window_px = job.track.window;
+  options.redetect = false;  // few points: their neighbours may be on another side of the finger
   options.model =
       job.track.model == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
   progress.stage("finger", std::min(source.frames_asked(), static_cast<int>(of_scene.size())));

@@ -79,6 +79,7 @@ void use_settings(const fitting::TrackCase& track, TrackJob& job) {
   options.seeds.max_tracks = track.max_tracks;
   options.seeds.min_distance_px = track.min_distance;
   options.window_px = track.window;
+  options.redetect = track.redetect;
   options.model = track.model == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
   if (!track.roi) return;
   const auto& r = *track.roi;
@@ -114,6 +115,7 @@ nlohmann::json track_settings(const TrackJob& job) {
           {"max_tracks", seeds.max_tracks},
           {"min_distance", seeds.min_distance_px},
           {"window", job.options.window_px},
+          {"redetect", job.options.redetect},
           {"roi", r.empty() ? nlohmann::json() : nlohmann::json({r.x, r.y, r.width, r.height})},
           {"last frame", job.footage.last}};
 }

@@ -56,6 +56,10 @@ class TrackVerb : public Verb {
                    "less freedom and fits skin that only shifts")
         ->option_text("MODEL")
         ->check(CLI::IsMember({"affine", "translation"}));
+    app.add_flag(
+        "--no-redetect", gives_up_,
+        "leave points that were covered or lost alone; else they are looked for in later frames, and go on "
+        "under their number where they are found and lead back to their start");
     app.add_flag("--there-and-back", there_and_back_,
                  "also follow the points back from the last frame to the first and say how far from their "
                  "start they end: drift, in px; takes as long again");
@@ -101,6 +105,7 @@ class TrackVerb : public Verb {
     if (max_tracks_ > 0) track.max_tracks = max_tracks_;
     if (min_distance_ > 0) track.min_distance = min_distance_;
     if (window_ > 0) track.window = window_;
+    if (gives_up_) track.redetect = false;
     return track;
   }
 
@@ -114,7 +119,7 @@ class TrackVerb : public Verb {
   std::vector<double> roi_;
   int max_tracks_ = 0, frames_ = 0, window_ = 0;
   double min_distance_ = 0;
-  bool there_and_back_ = false;
+  bool there_and_back_ = false, gives_up_ = false;
 };
 
 }  // namespace

@@ -2,8 +2,8 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace rhytid::fitting {
 namespace {
@@ -41,9 +41,8 @@ Refusal judge(const Alignment& a, const Vec2& guess, double max_correction, cons
   return Refusal::none;
 }
 
-/// Aligns with the chosen model. The deformation is held at `held`, and only the position sought, when
-/// texture does not fix it: when the affine alignment is refused, or makes the position much less certain
-/// (twice the variance) without explaining the picture better (10 % of the residual).
+}  // namespace
+
 Refusal try_align(const PatchTemplate& patch, const PatchWarp& start, const Eigen::Matrix2d& held_at,
                   double max_correction, const FrameView& view, const TrackerOptions& o,
                   double min_correlation, Alignment* result) {
@@ -68,8 +67,6 @@ Refusal try_align(const PatchTemplate& patch, const PatchWarp& start, const Eige
   }
   return refusal;
 }
-
-}  // namespace
 
 double covered_fraction(const cv::Mat& mask, const Vec2& pixel, int half) {
   if (mask.empty()) return 0;
@@ -114,10 +111,35 @@ Measurement measure(const Follower& f, const FlowGuess& guess, const Eigen::Matr
   return m;
 }
 
+namespace {
+
+/// A window that still correlates this well is neither covered, however still the footage was before, nor mistaken.
+constexpr double kIntact = 0.95;
+
+}  // namespace
+
+bool strays(const Follower& f, const Alignment& a, const std::vector<std::pair<Vec2, Vec2>>& others) {
+  constexpr std::size_t kNeighbours = 8, kFewest = 4;
+  if (a.correlation >= kIntact || others.size() < kFewest) return false;
+  const std::size_t count = std::min(kNeighbours, others.size());
+  std::vector<std::pair<double, std::size_t>> near;
+  for (std::size_t i = 0; i < others.size(); ++i)
+    near.emplace_back((others[i].first - f.warp.centre).squaredNorm(), i);
+  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end());
+  const auto median = [count](std::array<double, kNeighbours> values) {
+    std::nth_element(values.begin(), values.begin() + count / 2, values.begin() + count);
+    return values[count / 2];
+  };
+  std::array<double, kNeighbours> x{}, y{}, spread{};
+  for (std::size_t i = 0; i < count; ++i)
+    x[i] = others[near[i].second].second.x(), y[i] = others[near[i].second].second.y();
+  const Vec2 usual(median(x), median(y));
+  for (std::size_t i = 0; i < count; ++i) spread[i] = (others[near[i].second].second - usual).norm();
+  return (a.warp.centre - f.warp.centre - usual).norm() > 2 + 5 * median(spread);
+}
+
 bool residual_jumped(const Follower& f, const Alignment& a, double typical, const FrameView& view,
                      const TrackerOptions& o) {
-  // A window that still correlates this well is not covered, however still the footage was before.
-  constexpr double kIntact = 0.95;
   const double usual = std::max({f.residual, typical, view.least_residual});
   return a.residual_rms > o.max_residual_jump * usual && a.correlation < kIntact;
 }
@@ -136,38 +158,6 @@ void measure_from_previous(const Follower& f, const FlowGuess& guess, double typ
   first->refusal = Refusal::none;
   first->from_previous = true;
   first->new_patch = std::move(patch);
-}
-
-Measurement search(const Follower& f, const PatchWarp& expected, const FrameView& view,
-                   const TrackerOptions& o) {
-  Measurement m;
-  m.refusal = Refusal::outside;
-  const int half = f.patch.half, reach = static_cast<int>(std::ceil(o.redetect_search_px)),
-            outer = half + reach;
-  const Eigen::Matrix2d gradient = expected.gradient * f.template_gradient.inverse();
-  // Undo the expected deformation, so that the search is over translations only.
-  cv::Mat straightened(2 * outer + 1, 2 * outer + 1, CV_32F);
-  for (int y = -outer; y <= outer; ++y)
-    for (int x = -outer; x <= outer; ++x) {
-      const Vec2 at = expected.centre + gradient * Vec2(x, y);
-      if (!view.image->contains(at.x(), at.y())) return m;
-      straightened.at<float>(y + outer, x + outer) =
-          static_cast<float>(view.image->sample(at.x(), at.y()).value);
-    }
-  cv::Mat patch(2 * half + 1, 2 * half + 1, CV_32F), score;
-  std::copy(f.patch.values.begin(), f.patch.values.end(), patch.begin<float>());
-  cv::matchTemplate(straightened, patch, score, cv::TM_CCOEFF_NORMED);
-  cv::Point best;
-  cv::minMaxLoc(score, nullptr, nullptr, nullptr, &best);
-  const Vec2 start = expected.centre + gradient * Vec2(best.x - reach, best.y - reach);
-  m.refusal = Refusal::occluded;
-  if (covered_fraction(*view.mask, start, half) > o.max_covered_fraction) return m;
-  // Whole pixels were searched, so the alignment may move by one on top of what the flow would be allowed.
-  m.refusal = try_align(f.patch, {start, gradient}, gradient, 1 + o.max_correction_px, view, o,
-                        o.redetect_min_correlation, &m.alignment);
-  if (m.refusal == Refusal::none && residual_jumped(f, m.alignment, f.baseline, view, o))
-    m.refusal = Refusal::residual;
-  return m;
 }
 
 void accept(const Measurement& m, const ResidualCorrelation& correlation, const FrameView& view,

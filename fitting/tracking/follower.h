@@ -34,8 +34,9 @@ struct Follower {
 struct FrameView {
   const SplineImage* image;
   const SplineImage* previous;
-  const cv::Mat* mask;    ///< covered pixels (may be empty)
-  double least_residual;  ///< quantisation noise of a difference of two images, grey
+  const SplineImage* first;  ///< frame, which lost points are compared with
+  const cv::Mat* mask;       ///< covered pixels (may be empty)
+  double least_residual;     ///< quantisation noise of a difference of two images, grey
 };
 
 /// Outcome for one track in one frame.
@@ -46,6 +47,14 @@ struct Measurement {
   bool from_previous = false;  ///< aligned with a template cut in the previous frame
   PatchTemplate new_patch;     ///< that template
 };
+
+/// Aligns with the chosen model, which has to end within `max_correction` px of `start` with at least
+/// `min_correlation`. The deformation is held at `held`, and only the position sought, when texture does not fix it: when
+/// the affine alignment is refused, or makes the position much less certain (twice the variance) without explaining
+/// the picture better (10 % of the residual).
+Refusal try_align(const PatchTemplate& patch, const PatchWarp& start, const Eigen::Matrix2d& held,
+                  double max_correction, const FrameView& view, const TrackerOptions& options,
+                  double min_correlation, Alignment* result);
 
 /// First attempt: aligns the follower's template near the guess, with the full warp model and, when that is
 /// not acceptable, with the deformation held at `held` (since the template was cut). Does not change the follower, as
@@ -63,16 +72,17 @@ Eigen::Matrix2d held_gradient(const std::vector<Follower>& followers, const Foll
 bool residual_jumped(const Follower& follower, const Alignment& alignment, double typical,
                      const FrameView& view, const TrackerOptions& options);
 
+/// Did the window move, since the last frame, unlike the eight nearest of `others` (places there, and motions), by more than
+/// 2 px and five times what these differ among themselves? Not asked where it matches its template well, nor of fewer than
+/// four others.
+bool strays(const Follower& follower, const Alignment& alignment,
+            const std::vector<std::pair<Vec2, Vec2>>& others);
+
 /// Second attempt (incremental reference update): the skin may have deformed too much since the template was
 /// taken, but much less since the previous frame; so aligns a template cut there. Keeps `first` when this
 /// fails.
 void measure_from_previous(const Follower& follower, const FlowGuess& guess, double typical,
                            const FrameView& view, const TrackerOptions& options, Measurement* first);
-
-/// Looks for a lost follower around `warp` (position and total deformation expected from its neighbours):
-/// coarse search by normalised correlation, then alignment.
-Measurement search(const Follower& follower, const PatchWarp& expected, const FrameView& view,
-                   const TrackerOptions& options);
 
 /// Takes an accepted measurement over into the follower: covariance, warp, baseline.
 void accept(const Measurement& measurement, const ResidualCorrelation& correlation, const FrameView& view,

@@ -262,22 +262,26 @@ std::vector<const Alignment*> spread(const std::vector<const Alignment*>& all) {
 
 }  // namespace
 
-PatchTemplate cut_template(const SplineImage& image, const Vec2& centre, int half) {
+PatchTemplate make_template(std::vector<double> values, int half) {
   PatchTemplate t;
   t.half = half;
-  if (!image.contains(centre.x() - half, centre.y() - half) ||
-      !image.contains(centre.x() + half, centre.y() + half))
-    return t;
+  t.values = std::move(values);
   double sum = 0, sum2 = 0;
-  for (int y = -half; y <= half; ++y)
-    for (int x = -half; x <= half; ++x) {
-      t.values.push_back(image.sample(centre.x() + x, centre.y() + y).value);
-      sum += t.values.back();
-    }
+  for (const double v : t.values) sum += v;
   t.mean = sum / t.values.size();
-  for (double v : t.values) sum2 += (v - t.mean) * (v - t.mean);
+  for (const double v : t.values) sum2 += (v - t.mean) * (v - t.mean);
   t.deviation = std::sqrt(sum2 / t.values.size());
   return t;
+}
+
+PatchTemplate cut_template(const SplineImage& image, const Vec2& centre, int half) {
+  if (!image.contains(centre.x() - half, centre.y() - half) ||
+      !image.contains(centre.x() + half, centre.y() + half))
+    return {half, {}, 0, 0};
+  std::vector<double> values;
+  for (int y = -half; y <= half; ++y)
+    for (int x = -half; x <= half; ++x) values.push_back(image.sample(centre.x() + x, centre.y() + y).value);
+  return make_template(std::move(values), half);
 }
 
 Alignment align(const PatchTemplate& patch, const SplineImage& image, const PatchWarp& start,

@@ -42,6 +42,9 @@ struct PatchTemplate {
   double deviation = 0;  ///< standard deviation of the values; 0 = no texture
 };
 
+/// From (2 half + 1)² grey values.
+PatchTemplate make_template(std::vector<double> values, int half);
+
 /// Cuts the window of half size `half` around `centre`. Empty values when it does not fit into the image.
 PatchTemplate cut_template(const SplineImage& image, const Vec2& centre, int half);
 

@@ -8,6 +8,7 @@
 #include "fitting/tracking/follower.h"
 #include "fitting/tracking/jitter.h"
 #include "fitting/tracking/optical_flow.h"
+#include "fitting/tracking/redetection.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
@@ -79,6 +80,7 @@ class Run {
   void start(const Frame& frame) {
     const int half = o_.window_px / 2;
     image_ = smooth_image(frame.grey, o_.smoothing_px);
+    first_ = image_;
     pyramid_ = flow_pyramid(frame.grey, o_.window_px, o_.pyramid_levels);
     for (const Vec2& seed : choose_seeds(frame.grey, mask_of(frame), half + 3, o_.seeds)) {
       Follower f;
@@ -113,7 +115,7 @@ class Run {
     const SplineImage image = smooth_image(frame.grey, o_.smoothing_px);
     const FlowPyramid pyramid = flow_pyramid(frame.grey, o_.window_px, o_.pyramid_levels);
     const cv::Mat mask = mask_of(frame);
-    const FrameView view{&image, &image_, &mask, least_residual_};
+    const FrameView view{&image, &image_, &first_, &mask, least_residual_};
     const std::vector<FlowGuess> guesses =
         flow(pyramid_, pyramid, active_positions(), o_.window_px, o_.pyramid_levels);
 
@@ -147,6 +149,7 @@ class Run {
       }
     });
 
+    refuse_strays(&measured);
     FrameCounts counts{frame.index, frame.time_s};
     take_over(view, guess_of, &measured, &counts);
     if (o_.redetect) find_lost(view, &measured, &counts);
@@ -175,6 +178,21 @@ class Run {
     for (const Measurement& m : measured)
       if (m.refusal == Refusal::none) residuals.push_back(m.alignment.residual_rms);
     return quantile(&residuals, 0.5);
+  }
+
+  void refuse_strays(std::vector<Measurement>* measured) const {
+    std::vector<std::size_t> accepted;
+    std::vector<std::pair<Vec2, Vec2>> motions;
+    for (std::size_t i = 0; i < measured->size(); ++i) {
+      if ((*measured)[i].refusal != Refusal::none) continue;
+      const Vec2& before = followers_[i].warp.centre;
+      accepted.push_back(i);
+      motions.emplace_back(before, (*measured)[i].alignment.warp.centre - before);
+    }
+    for (std::size_t k = 0; k < accepted.size(); ++k) {
+      Measurement& m = (*measured)[accepted[k]];
+      if (strays(followers_[accepted[k]], m.alignment, motions)) m.refusal = Refusal::neighbours;
+    }
   }
 
   /// Accepts or refuses what was measured; noise statistics of the frame.
@@ -211,19 +229,24 @@ class Run {
   }
 
   void find_lost(const FrameView& view, std::vector<Measurement>* measured, FrameCounts* counts) {
-    std::vector<int> found;
-    for (std::size_t i = 0; i < followers_.size(); ++i) {
-      if (followers_[i].active || followers_[i].patch.values.empty()) continue;
-      const std::optional<PatchWarp> expected = expected_from_neighbours(followers_, followers_[i].seed);
-      if (!expected) continue;
-      Measurement m = search(followers_[i], *expected, view, o_);
-      if (m.refusal != Refusal::none) continue;
-      (*measured)[i] = std::move(m);
-      found.push_back(static_cast<int>(i));
-    }
+    std::vector<char> is_found(followers_.size(), 0);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(followers_.size())), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        if (followers_[i].active || followers_[i].patch.values.empty()) continue;
+        const std::optional<PatchWarp> expected = expected_from_neighbours(followers_, followers_[i].seed);
+        if (!expected) continue;
+        Measurement m = redetect(followers_[i], *expected, view, o_);
+        if (m.refusal != Refusal::none) continue;
+        (*measured)[i] = std::move(m);
+        is_found[i] = 1;
+      }
+    });
     // After the loop, so that a point found does not count as a neighbour of the next in the same frame.
-    for (int i : found) accept((*measured)[i], correlation_, view, &followers_[i]);
-    counts->redetected = static_cast<int>(found.size());
+    for (std::size_t i = 0; i < followers_.size(); ++i) {
+      if (!is_found[i]) continue;
+      accept((*measured)[i], correlation_, view, &followers_[i]);
+      ++counts->redetected;
+    }
   }
 
   /// Cuts new templates where the skin in the window has changed beyond what the warp explains.
@@ -341,7 +364,7 @@ class Run {
   const TrackerOptions& o_;
   TrackerReport report_;
   std::vector<Follower> followers_;
-  SplineImage image_;  // of the last frame
+  SplineImage first_, image_;  // of the first and of the last frame
   FlowPyramid pyramid_;
   ResidualCorrelation correlation_{{}};
   double least_residual_ = 0, typical_baseline_ = 0;

@@ -40,8 +40,9 @@ enum class Refusal {
   residual,          ///< residual jumped: something covers part of the window, or the skin folded
   correction,        ///< alignment disagrees with the flow
   uncertain,         ///< standard deviation above max_sigma_px
+  neighbours,        ///< moved unlike its neighbours and fits badly: something else that looks alike
 };
-inline constexpr int kNumRefusals = 10;
+inline constexpr int kNumRefusals = 11;
 const char* to_string(Refusal refusal);
 
 struct TrackerOptions {
@@ -72,9 +73,10 @@ struct TrackerOptions {
   double update_correlation = 0.9;
   double max_gradient_change = 0.4;  ///< also renewed when |A − I| exceeds this
 
-  bool redetect = false;  ///< look for lost points where their neighbours say they should be
+  bool redetect = true;  ///< look for lost points where their neighbours say they should be (redetection.h)
   double redetect_search_px = 6;
   double redetect_min_correlation = 0.8;
+  double redetect_max_return_px = 0.5;  ///< from the seed, where what was found ends in the first frame
 
   /// Called after every frame; returning false stops the run (the report says interrupted).
   std::function<bool(const FrameCounts&, int frames_processed, int frames_asked)> progress;

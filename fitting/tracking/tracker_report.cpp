@@ -34,14 +34,15 @@ void TrackerOptions::validate() const {
   check(o.max_gradient_change > 0, "max_gradient_change", o.max_gradient_change, "above 0");
   check(o.redetect_search_px >= 1 && o.redetect_search_px <= 100, "redetect_search_px", o.redetect_search_px,
         "1 to 100 px");
+  check(o.redetect_max_return_px > 0, "redetect_max_return_px", o.redetect_max_return_px, "above 0 px");
   check(!o.camera.empty() && o.camera.find_first_of(",\r\n") == std::string::npos, "camera", 0,
         "a name without commas");
 }
 
 const char* to_string(Refusal refusal) {
   constexpr std::array<const char*, kNumRefusals> names = {
-      "none",          "occluded",    "outside",  "flow",       "forward_backward",
-      "not_converged", "correlation", "residual", "correction", "uncertain"};
+      "none",        "occluded", "outside",    "flow",      "forward_backward", "not_converged",
+      "correlation", "residual", "correction", "uncertain", "neighbours"};
   return names.at(static_cast<std::size_t>(refusal));
 }
 
@@ -59,13 +60,14 @@ const char* to_string(TrackerEnd end) {
 
 std::string summary(const TrackerReport& r) {
   char text[400];
-  std::snprintf(text, sizeof text,
-                "%d of %d frames (%s); %d tracks started, %d kept to the end, %d in every frame\n"
-                "flow there and back per frame: median %.3f px, 95 %% %.3f px; noise %.2f grey; jitter %.3f "
-                "px; sigma %.3f px; %d template updates",
-                r.frames_processed, r.frames_asked, to_string(r.end), r.started, r.kept, r.unbroken,
-                r.forward_backward_median_px, r.forward_backward_95_px, r.noise_grey, r.jitter_px,
-                r.sigma_median_px, r.template_updates);
+  std::snprintf(
+      text, sizeof text,
+      "%d of %d frames (%s); %d tracks started, %d kept to the end, %d in every frame, %d times found again\n"
+      "flow there and back per frame: median %.3f px, 95 %% %.3f px; noise %.2f grey; jitter %.3f "
+      "px; sigma %.3f px; %d template updates",
+      r.frames_processed, r.frames_asked, to_string(r.end), r.started, r.kept, r.unbroken, r.redetected,
+      r.forward_backward_median_px, r.forward_backward_95_px, r.noise_grey, r.jitter_px, r.sigma_median_px,
+      r.template_updates);
   return text;
 }
 

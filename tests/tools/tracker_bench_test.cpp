@@ -114,7 +114,7 @@ TEST(TrackerBench, ErrorsOfCompressedVideoAreStated) {
 }
 
 TEST(TrackerBench, DiscsAreMaskedOrRefused) {
-  const TrackingScore masked = score("disc_masked"), bare = score("disc"), again = score("disc_redetect");
+  const TrackingScore masked = score("disc_masked"), bare = score("disc_given_up"), again = score("disc");
   EXPECT_GT(masked.refusals[static_cast<std::size_t>(fitting::Refusal::occluded)], 0);
   EXPECT_EQ(masked.gross, 0);
   EXPECT_LT(bare.kept, 0.95);

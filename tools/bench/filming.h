@@ -30,7 +30,7 @@ struct Filming {
   double defocus_px = 0;             ///< deviation of a Gaussian blur at the end, growing from 0
   bool has_disc = false;             ///< a textured disc passes
   bool is_disc_masked = false;       ///< and the tracker is told where
-  bool redetect = false;
+  bool redetect = true;              ///< lost points are looked for
   bool h264 = false;
 };
 

@@ -88,10 +88,10 @@ std::vector<Filming> all_filmings() {
        .has_disc = true,
        .is_disc_masked = true});
   add({.name = "disc", .description = "a disc passes, no mask", .has_disc = true});
-  add({.name = "disc_redetect",
-       .description = "a disc passes, no mask, lost points are looked for",
+  add({.name = "disc_given_up",
+       .description = "a disc passes, no mask, lost points are not looked for",
        .has_disc = true,
-       .redetect = true});
+       .redetect = false});
   add({.name = "webcam",
        .description = "5 px a frame, shutter open half the time, side light, flicker, noise of 3 grey, H.264",
        .exposure = 0.5,
