@@ -2,6 +2,7 @@
 //
 //   lane_log1p      ln(1 + x)        1.7 ulp     2^k m = 1 + x, m in [√½, √2); the rounding of 1 + x corrected
 //   lane_expm1      e^x − 1          2 ulp       x = k ln 2 + r
+//   lane_sinhc      sinh(x)/x        4 ulp       series, or by lane_expm1 beyond 1
 //   log_quotients   ln a − ln b and (ln a − ln b)/(a − b), a − b known to better than it could be formed; 5 ulp
 //
 // All are smooth through 0 and a = b: numbers near the rest state keep all their digits. NaN stays NaN.
@@ -106,6 +107,28 @@ template <class V>
   const V half = lane_from_bits((lane_bits(rounded) << 52) + (B::one - B::one_exponent));
   const V result = 2.0 * (half * grown + (half - 0.5));
   return select(x > largest, broadcast<V>(std::numeric_limits<double>::infinity()), result);
+}
+
+/// sinh(x)/x, even, ≥ 1; |x| < 709.
+template <class V>
+V lane_sinhc(const V& x) {
+  const V square = x * x;
+  // 1/(2k + 1)!; the first term left out is x²⁰/21!, 2e-20 at the switch.
+  constexpr double c[] = {1.0,
+                          1. / 6,
+                          1. / 120,
+                          1. / 5040,
+                          1. / 362880,
+                          1. / 39916800,
+                          1. / 6227020800,
+                          1. / 1307674368000,
+                          1. / 355687428096000,
+                          1. / 121645100408832000};
+  const V near = lane_polynomial(square, c);
+  const typename MaskOf<V>::type is_far = square > 1.0;
+  if (!any_of(is_far)) return near;
+  const V size = select(x < 0, -x, x), grown = lane_expm1(size);
+  return select(is_far, 0.5 * (grown + grown / (grown + 1.0)) / size, near);
 }
 
 /// ln a − ln b and its quotient by a − b, for a, b > 0; `difference` = a − b. Smooth through a = b.

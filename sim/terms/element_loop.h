@@ -14,8 +14,6 @@
 
 namespace rhytid {
 
-inline constexpr int kMaxElementNodes = 80;
-
 /// Nodal values of one element, [n][3], on the stack.
 using NodalValues = std::array<double, std::size_t{3} * kMaxElementNodes>;
 

@@ -6,6 +6,8 @@
 
 namespace rhytid {
 
+/// Nodes of an element at most.
+inline constexpr int kMaxElementNodes = 80;
 /// Directions that one tangent kernel call carries.
 inline constexpr int kDirections = 8;
 /// Rows of the table that one Hessian pass treats; a multiple of R.

@@ -18,8 +18,8 @@ struct KernelTable {
                   bool projected, double* work, double* dense);
   void (*update)(const void* law, const ElementView&, const double* u, const double* prepared, double* s_new);
   void (*tangent)(const void* law, const ElementView&, const double* u, const double* u_old,
-                  const double* s_old, const double* du, const double* du_old, const double* ds_old,
-                  const double* dtheta, double* df, double* ds_new);
+                  const double* s_old, const double* prepared, const double* du, const double* du_old,
+                  const double* ds_old, const double* dtheta, double* df, double* ds_new);
   void (*adjoint_update)(const void* law, const ElementView&, const double* u, const double* prepared,
                          const double* s_bar, double* u_bar);
   void (*adjoint_step)(const void* law, const ElementView&, const double* u, const double* u_old,

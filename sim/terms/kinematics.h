@@ -69,6 +69,25 @@ struct PrismKinematics {
       }
   }
 
+  /// X⁻¹ dY X⁻ᵀ by dH in natural directions, frame = X⁻ᵀ: t[c][3a + r] = G_ia K_rj + G_ja K_ri for c = (i, j),
+  /// G = X⁻¹Fᵀ, K = ∂ξ/∂X X⁻ᵀ.
+  template <class V>
+  static void strain_direction_in(const V (*frame)[3], const V* h, const V* ji, V (*t)[9]) {
+    V g[3][3], k[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int a = 0; a < 3; ++a) {
+        g[i][a] = frame[0][i] * deformation(h, a, 0) + frame[1][i] * deformation(h, a, 1) +
+                  frame[2][i] * deformation(h, a, 2);
+        k[a][i] = ji[3 * a] * frame[0][i] + ji[3 * a + 1] * frame[1][i] + ji[3 * a + 2] * frame[2][i];
+      }
+    for (int c = 0; c < 6; ++c) {
+      const int i = kSymRow[c], j = kSymCol[c];
+      for (int a = 0; a < 3; ++a)
+        for (int r = 0; r < 3; ++r)
+          t[c][3 * a + r] = c < 3 ? 2.0 * g[i][a] * k[r][i] : g[i][a] * k[r][j] + g[j][a] * k[r][i];
+    }
+  }
+
   /// J times the first Piola stress F⁻ᵀ M of a Mandel stress M = C S: cof F · M.
   template <class V>
   static void piola_from_mandel(const V* h, const V (*m)[3], V* piola) {

@@ -32,8 +32,9 @@ constexpr KernelTable kernel_table() {
         K::update(*static_cast<const Law*>(l), v, u, p, s);
       },
       [](const void* l, const ElementView& v, const double* u, const double* uo, const double* so,
-         const double* du, const double* duo, const double* dso, const double* dt, double* df,
-         double* ds) { K::tangent(*static_cast<const Law*>(l), v, u, uo, so, du, duo, dso, dt, df, ds); },
+         const double* p, const double* du, const double* duo, const double* dso, const double* dt,
+         double* df,
+         double* ds) { K::tangent(*static_cast<const Law*>(l), v, u, uo, so, p, du, duo, dso, dt, df, ds); },
       [](const void* l, const ElementView& v, const double* u, const double* p, const double* sb,
          double* ub) { K::adjoint_update(*static_cast<const Law*>(l), v, u, p, sb, ub); },
       [](const void* l, const ElementView& v, const double* u, const double* uo, const double* so,

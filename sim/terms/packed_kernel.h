@@ -26,31 +26,7 @@ struct PackedKernel {
   static_assert(ne == 6 && nz == 9, "prisms only");
   static constexpr int at_least_one(int n) { return n > 0 ? n : 1; }
 
-  /// Numbers of the step that points share, where they do.
-  struct Shared {
-    Lanes theta[nt] = {}, constants[at_least_one(nc)] = {};
-
-    Shared(const Law& law, const ElementView& v) {
-      if (v.theta_stride != 0) return;
-      double own[at_least_one(nc)];
-      law.constants(v.theta, v.dt, own);
-      for (int c = 0; c < nt; ++c) theta[c] = broadcast<Lanes>(v.theta[c]);
-      for (int c = 0; c < nc; ++c) constants[c] = broadcast<Lanes>(own[c]);
-    }
-    /// The same for points that have parameters of their own; apart, since they seldom have.
-    [[gnu::noinline]] Shared(const Law& law, const ElementView& v, const int* points) {
-      double theta_numbers[nt][kLanes] = {}, own_numbers[at_least_one(nc)][kLanes] = {};
-      for (int k = 0; k < kLanes; ++k) {
-        const double* th = v.theta + static_cast<std::size_t>(points[k]) * v.theta_stride;
-        double own[at_least_one(nc)];
-        law.constants(th, v.dt, own);
-        for (int c = 0; c < nt; ++c) theta_numbers[c][k] = th[c];
-        for (int c = 0; c < nc; ++c) own_numbers[c][k] = own[c];
-      }
-      for (int c = 0; c < nt; ++c) theta[c] = load_lanes(theta_numbers[c]);
-      for (int c = 0; c < nc; ++c) constants[c] = load_lanes(own_numbers[c]);
-    }
-  };
+  using Parameters = PackedParameters<nt, nc>;
 
   /// Points of a pack; past the element's end the last point is repeated with weight 0.
   struct Pack {
@@ -76,13 +52,14 @@ struct PackedKernel {
     fetch(v.inverse_jacobian, 9 * v.num_points);
     fetch(prepared, np * v.num_points);
     sums.gather(u, natural);
-    Shared shared(law, v);
+    const auto constants = [&](const double* theta, double* c) { law.constants(theta, v.dt, c); };
+    Parameters shared(v, constants);
     Lanes total = {};
     for (int first = 0; first < v.num_points; first += kLanes) {
       const Pack p(v, natural, prepared, sums.points(), first);
       const Lanes jm1 = Kin::det_minus_one_of(p.h);
       if (any_of(!(jm1 > -1))) return std::numeric_limits<double>::infinity();
-      if (v.theta_stride != 0) shared = Shared(law, v, sums.points() + first);
+      if (v.theta_stride != 0) shared = Parameters(v, sums.points() + first, constants);
       Lanes mandel[3][3];
       total +=
           p.weight * law.template mandel<Lanes>(p.y, jm1, p.prepared, shared.theta, shared.constants, mandel);
@@ -105,10 +82,11 @@ struct PackedKernel {
     alignas(8 * kLanes) double natural[nz][kMaxPacked];
     PackedSums sums(v);
     sums.gather_in_order(u, natural);
-    Shared shared(law, v);
+    const auto constants = [&](const double* theta, double* c) { law.constants(theta, v.dt, c); };
+    Parameters shared(v, constants);
     for (int first = 0; first < v.num_points; first += kLanes) {
       const Pack p(v, natural, prepared, sums.points(), first);
-      if (v.theta_stride != 0) shared = Shared(law, v, sums.points() + first);
+      if (v.theta_stride != 0) shared = Parameters(v, sums.points() + first, constants);
       Lanes sigma[ne], tangent[ne][ne], a[nz][nz];
       (void)law.template response<Lanes>(p.y, p.prepared, shared.theta, shared.constants, sigma, tangent);
       material_block(p.h, tangent, a);

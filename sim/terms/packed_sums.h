@@ -273,5 +273,44 @@ void load_points(const double* values, const int* points, Lanes* out) {
   load_transposed<count>(rows, out);
 }
 
+/// The same back, for the first `num` points.
+template <int count>
+void store_points(const Lanes* in, const int* points, int num, double* values) {
+  for (int c = 0; c < count; ++c)
+    for (int k = 0; k < num; ++k) values[points[k] * count + c] = in[c][k];
+}
+
+/// Parameters of the points of a pack, and constants of the step that make(θ, constants) finds: the same at all points,
+/// or not.
+template <int nt, int nc>
+struct PackedParameters {
+  static constexpr int num_constants = nc > 0 ? nc : 1;
+  Lanes theta[nt] = {}, constants[num_constants] = {};
+
+  /// What points share, where they do.
+  template <class Make>
+  PackedParameters(const ElementView& v, const Make& make) {
+    if (v.theta_stride != 0) return;
+    double own[num_constants];
+    make(v.theta, own);
+    for (int c = 0; c < nt; ++c) theta[c] = broadcast<Lanes>(v.theta[c]);
+    for (int c = 0; c < nc; ++c) constants[c] = broadcast<Lanes>(own[c]);
+  }
+  /// The same for points that have parameters of their own; apart, since they seldom have.
+  template <class Make>
+  [[gnu::noinline]] PackedParameters(const ElementView& v, const int* points, const Make& make) {
+    double theta_numbers[nt][kLanes] = {}, own_numbers[num_constants][kLanes] = {};
+    for (int k = 0; k < kLanes; ++k) {
+      const double* th = v.theta + static_cast<std::size_t>(points[k]) * v.theta_stride;
+      double own[num_constants];
+      make(th, own);
+      for (int c = 0; c < nt; ++c) theta_numbers[c][k] = th[c];
+      for (int c = 0; c < nc; ++c) own_numbers[c][k] = own[c];
+    }
+    for (int c = 0; c < nt; ++c) theta[c] = load_lanes(theta_numbers[c]);
+    for (int c = 0; c < nc; ++c) constants[c] = load_lanes(own_numbers[c]);
+  }
+};
+
 }  // namespace RHYTID_ISA
 }  // namespace rhytid

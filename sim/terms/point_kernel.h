@@ -3,11 +3,12 @@
 //   energy       W = Σ_q w_q ψ(e_q)                       e = Y(∇u) on prisms, e = u on surfaces
 //   gradient     ∂W/∂u = Σ_q w_q Zᵀ (∂e/∂z)ᵀ σ            z = ∇u or u, linear in the nodal values: z = Z u
 //   Hessian      Zᵀ [ (∂e/∂z)ᵀ (∂σ/∂e) (∂e/∂z) + σ·∂²e/∂z² ] Z
-//   cross blocks derivatives of σ and of the history update by old state and parameters, with dual numbers;
-//                their transposes on prisms by reverse-mode numbers (reverse_kernel.h)
+//   cross blocks derivatives of σ and of the history update by old state and parameters, and their transposes: in closed
+//                form where the law has one (packed_tangent.h, packed_adjoint.h), else by dual numbers (dual_kernel.h), the
+//                transposes on prisms by reverse-mode numbers (reverse_kernel.h)
 //
 // A law supplies prepare, stress and update, templated on the scalar (skin_law.h is the richest example);
-// everything else, tangent and adjoint blocks included, is here and knows no physics. Eigen-free: the prism
+// everything else, tangent and adjoint blocks included, is here and in these files and knows no physics. Eigen-free: the prism
 // kernels are compiled once per instruction set.
 //
 // Shapes   natural gradients table [q·R + r][npad], R = 3 on prisms, 1 on surfaces; element vectors [n][3].
@@ -19,9 +20,12 @@
 #include <limits>
 
 #include "sim/math/jacobi.h"
+#include "sim/terms/dual_kernel.h"
 #include "sim/terms/element_sums.h"
 #include "sim/terms/kinematics.h"
+#include "sim/terms/packed_adjoint.h"
 #include "sim/terms/packed_kernel.h"
+#include "sim/terms/packed_tangent.h"
 #include "sim/terms/reverse_kernel.h"
 #include "sim/terms/term_energies.h"
 
@@ -31,34 +35,15 @@ inline namespace RHYTID_ISA {
 
 /// Element kernels of a law on a kinematics. All pointers are per element; see ElementView for shapes.
 template <class Law, class Kin>
-struct PointKernel {
+struct PointKernel : DualKernel<Law, Kin> {
+  using Points = DualKernel<Law, Kin>;
+  using Points::at_least_one, Points::point, Points::put_point, Points::rest, Points::theta;
   static constexpr int ne = Law::ne, nz = Kin::nz, ns = Law::ns, np = Law::np, nt = Law::ntheta,
-                       R = Kin::rows;
-  static_assert(Law::ne == Kin::ne);
+                       R = Kin::rows, max_rows = Points::max_rows;
   /// The law has a closed-form tangent: energy, gradient and Hessian then run in packs of points.
   static constexpr bool has_response = requires { Law::num_constants; };
-  static constexpr int max_rows = kMaxRows;
-  static constexpr int at_least_one(int n) { return n > 0 ? n : 1; }
-
-  static const double* theta(const ElementView& v, int q) {
-    return v.theta + static_cast<std::size_t>(q) * v.theta_stride;
-  }
-  static const double* rest(const ElementView& v, int q) {
-    return v.rest ? v.rest + q * Law::nrest : nullptr;
-  }
-
-  static void point(const ElementView& v, const double (*natural)[max_rows], int q, double* z) {
-    double local[nz];
-    for (int a = 0; a < 3; ++a)
-      for (int r = 0; r < R; ++r) local[a * R + r] = natural[a][q * R + r];
-    Kin::to_point(local, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, z);
-  }
-  static void put_point(const ElementView& v, const double* p, int q, double (*natural)[max_rows]) {
-    double local[nz];
-    Kin::from_point(p, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, v.weight[q], local);
-    for (int a = 0; a < 3; ++a)
-      for (int r = 0; r < R; ++r) natural[a][q * R + r] = local[a * R + r];
-  }
+  /// And the derivatives of a step: so do tangent and adjoint blocks.
+  static constexpr bool has_step_derivatives = requires { Law::num_tangent_constants; };
 
   /// prepared[nq][np] from the old state.
   static void prepare(const Law& law, const ElementView& v, const double* u_old, const double* s_old,
@@ -288,207 +273,42 @@ struct PointKernel {
     }
   }
 
-  using Directions = Dual<kDirections>;
-  static_assert(kDirections % kLanes == 0);
-
-  static void load_jacobian(const ElementView& v, int q, Lanes* jacobian) {
-    if constexpr (R == 3)
-      for (int i = 0; i < 9; ++i) jacobian[i] = broadcast<Lanes>(v.inverse_jacobian[9 * q + i]);
-  }
-
-  /// A strain as a dual along kDirections nodal directions du [n][3][kDirections] (null = zero derivative).
-  static void seed_strain(const ElementView& v, const double (*natural)[max_rows], const double* du, int q,
-                          Directions* e) {
-    double z[nz], value[ne];
-    point(v, natural, q, z);
-    Kin::strain(z, value);
-    for (int c = 0; c < ne; ++c) e[c] = Directions(value[c]);
-    if (!du) return;
-    Lanes jacobian[9] = {};
-    load_jacobian(v, q, jacobian);
-    double b[ne][nz];
-    Kin::strain_gradient(z, b);
-    for (int k = 0; k < kDirections; k += kLanes) {
-      Lanes local[nz], dz[nz];
-      gather_directions<R>(v, du, q, k, local);
-      Kin::to_point(local, jacobian, dz);
-      for (int c = 0; c < ne; ++c) {
-        Lanes sum = {};
-        for (int i = 0; i < nz; ++i) sum += b[c][i] * dz[i];
-        std::memcpy(e[c].d + k, &sum, sizeof sum);
-      }
-    }
-  }
-
   /// Directional derivatives along (du, du_old [n][3][8], ds_old [nq][ns][8], dtheta [nq][nt][8]); any may be
   /// null. Adds the residual's derivative at fixed u to df [n][3][8] when df is given; writes the history
   /// update's derivative ds_new [nq][ns][8] (with du) when ds_new is given.
   static void tangent(const Law& law, const ElementView& v, const double* u, const double* u_old,
-                      const double* s_old, const double* du, const double* du_old, const double* ds_old,
-                      const double* dtheta, double* df, double* ds_new) {
-    double natural[3][max_rows], natural_old[3][max_rows];
-    gather<R>(v, u, natural);
-    gather<R>(v, u_old, natural_old);
-    for (int q = 0; q < v.num_points; ++q) {
-      Directions e[ne], e_old[ne], s[at_least_one(ns)], th[nt], prepared[at_least_one(np)];
-      seed_strain(v, natural_old, du_old, q, e_old);
-      if constexpr (ns > 0)
-        for (int c = 0; c < ns; ++c) {
-          s[c] = s_old[q * ns + c];
-          if (ds_old) std::memcpy(s[c].d, ds_old + (q * ns + c) * kDirections, sizeof s[c].d);
-        }
-      for (int c = 0; c < nt; ++c) {
-        th[c] = theta(v, q)[c];
-        if (dtheta) std::memcpy(th[c].d, dtheta + (q * nt + c) * kDirections, sizeof th[c].d);
-      }
-      law.template prepare<Directions>(e_old, s, th, rest(v, q), v.dt, prepared);
-      if (df) {
-        Directions sigma[ne];
-        double z[nz], b[ne][nz];
-        seed_strain(v, natural, nullptr, q, e);
-        (void)law.template stress<Directions>(e, prepared, th, rest(v, q), v.dt, sigma);
-        point(v, natural, q, z);
-        Kin::strain_gradient(z, b);
-        Lanes jacobian[9] = {};
-        load_jacobian(v, q, jacobian);
-        for (int k = 0; k < kDirections; k += kLanes) {
-          Lanes p[nz] = {}, local[nz];
-          for (int c = 0; c < ne; ++c) {
-            Lanes along;
-            std::memcpy(&along, sigma[c].d + k, sizeof along);
-            for (int i = 0; i < nz; ++i) p[i] += b[c][i] * along;
-          }
-          Kin::from_point(p, jacobian, broadcast<Lanes>(v.weight[q]), local);
-          scatter_directions<R>(v, local, q, k, df);
-        }
-      }
-      if constexpr (ns > 0) {
-        if (ds_new) {
-          Directions s_new[ns];
-          seed_strain(v, natural, du, q, e);
-          law.template update<Directions>(e, prepared, th, rest(v, q), v.dt, s_new);
-          for (int c = 0; c < ns; ++c)
-            std::memcpy(ds_new + (q * ns + c) * kDirections, s_new[c].d, sizeof s_new[c].d);
-        }
-      }
-    }
+                      const double* s_old, const double* prepared, const double* du, const double* du_old,
+                      const double* ds_old, const double* dtheta, double* df, double* ds_new) {
+    if constexpr (has_step_derivatives)
+      PackedTangent<Law, Kin>::tangent(law, v, u, u_old, s_old, prepared, du, du_old, ds_old, dtheta, df,
+                                       ds_new);
+    else
+      Points::tangent_by_points(law, v, u, u_old, s_old, du, du_old, ds_old, dtheta, df, ds_new);
   }
-
   /// Adds (∂s_new/∂u)ᵀ s_bar to u_bar [n][3].
   static void adjoint_update(const Law& law, const ElementView& v, const double* u, const double* prepared,
                              const double* s_bar, double* u_bar) {
-    if constexpr (R == 3)
+    if constexpr (has_step_derivatives)
+      PackedAdjoint<Law, Kin>::adjoint_update(law, v, u, prepared, s_bar, u_bar);
+    else if constexpr (R == 3)
       ReverseKernel<Law, Kin>::adjoint_update(law, v, u, prepared, s_bar, u_bar);
     else
-      adjoint_update_by_points(law, v, u, prepared, s_bar, u_bar);
+      Points::adjoint_update_by_points(law, v, u, prepared, s_bar, u_bar);
   }
-  /// The same by dual numbers.
-  static void adjoint_update_by_points(const Law& law, const ElementView& v, const double* u,
-                                       const double* prepared, const double* s_bar, double* u_bar) {
-    if constexpr (ns > 0) {
-      double natural[3][max_rows], out[3][max_rows];
-      gather<R>(v, u, natural);
-      for (int q = 0; q < v.num_points; ++q) {
-        double z[nz], e[ne], b[ne][nz], p[nz];
-        point(v, natural, q, z);
-        Kin::strain(z, e);
-        Dual<ne> ed[ne], pd[at_least_one(np)], td[nt], s_new[ns];
-        for (int c = 0; c < ne; ++c) ed[c] = Dual<ne>::variable(e[c], c);
-        for (int c = 0; c < np; ++c) pd[c] = prepared[q * np + c];
-        for (int c = 0; c < nt; ++c) td[c] = theta(v, q)[c];
-        law.template update<Dual<ne>>(ed, pd, td, rest(v, q), v.dt, s_new);
-        Kin::strain_gradient(z, b);
-        for (int i = 0; i < nz; ++i) p[i] = 0;
-        for (int c = 0; c < ne; ++c) {
-          double bar = 0;
-          for (int k = 0; k < ns; ++k) bar += s_bar[q * ns + k] * s_new[k].d[c];
-          for (int i = 0; i < nz; ++i) p[i] += bar * b[c][i];
-        }
-        for (int i = 0; i < nz; ++i)
-          p[i] /= v.weight[q];  // put_point multiplies by the weight; this sum has none
-        put_point(v, p, q, out);
-      }
-      scatter<R>(v, out, u_bar);
-    }
-  }
-
   /// Transposed cross blocks of φ = −λ·R + s_bar·s_new at fixed u: adds ∂φ/∂u_old to u_old_bar [n][3], writes
   /// ∂φ/∂s_old to s_old_bar [nq][ns] and ∂φ/∂θ to theta_bar [nq][nt].
   static void adjoint_step(const Law& law, const ElementView& v, const double* u, const double* u_old,
                            const double* s_old, const double* prepared, const double* adj,
                            const double* s_bar, double* u_old_bar, double* s_old_bar, double* theta_bar) {
-    if constexpr (R == 3)
+    if constexpr (has_step_derivatives)
+      PackedAdjoint<Law, Kin>::adjoint_step(law, v, u, u_old, s_old, prepared, adj, s_bar, u_old_bar,
+                                            s_old_bar, theta_bar);
+    else if constexpr (R == 3)
       ReverseKernel<Law, Kin>::adjoint_step(law, v, u, u_old, s_old, prepared, adj, s_bar, u_old_bar,
                                             s_old_bar, theta_bar);
     else
-      adjoint_step_by_points(law, v, u, u_old, s_old, prepared, adj, s_bar, u_old_bar, s_old_bar, theta_bar);
-  }
-  /// The same by dual numbers.
-  static void adjoint_step_by_points(const Law& law, const ElementView& v, const double* u,
-                                     const double* u_old, const double* s_old, const double* prepared,
-                                     const double* adj, const double* s_bar, double* u_old_bar,
-                                     double* s_old_bar, double* theta_bar) {
-    constexpr int nd = np + nt, no = ne + ns + nt;
-    double natural[3][max_rows], natural_old[3][max_rows], natural_adj[3][max_rows], out[3][max_rows];
-    gather<R>(v, u, natural);
-    gather<R>(v, adj, natural_adj);
-    if constexpr (np > 0) gather<R>(v, u_old, natural_old);
-    for (int q = 0; q < v.num_points; ++q) {
-      double z[nz], e[ne], b[ne][nz], dz[nz], de[ne];
-      point(v, natural, q, z);
-      Kin::strain(z, e);
-      Kin::strain_gradient(z, b);
-      point(v, natural_adj, q, dz);
-      for (int c = 0; c < ne; ++c) {
-        de[c] = 0;
-        for (int i = 0; i < nz; ++i) de[c] += b[c][i] * dz[i];
-      }
-      double prepared_bar[at_least_one(np)] = {};
-      {
-        Dual<nd> ed[ne], pd[at_least_one(np)], td[nt], sigma[ne];
-        for (int c = 0; c < ne; ++c) ed[c] = e[c];
-        for (int c = 0; c < np; ++c) pd[c] = Dual<nd>::variable(prepared[q * np + c], c);
-        for (int c = 0; c < nt; ++c) td[c] = Dual<nd>::variable(theta(v, q)[c], np + c);
-        (void)law.template stress<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, sigma);
-        double bar[nd];
-        for (int k = 0; k < nd; ++k) {
-          bar[k] = 0;
-          for (int c = 0; c < ne; ++c) bar[k] -= v.weight[q] * de[c] * sigma[c].d[k];
-        }
-        if constexpr (ns > 0) {
-          Dual<nd> s_new[ns];
-          law.template update<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, s_new);
-          for (int k = 0; k < nd; ++k)
-            for (int c = 0; c < ns; ++c) bar[k] += s_bar[q * ns + c] * s_new[c].d[k];
-        }
-        for (int c = 0; c < np; ++c) prepared_bar[c] = bar[c];
-        for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] = bar[np + c];
-      }
-      if constexpr (np > 0) {
-        double z_old[nz], e_old[ne], b_old[ne][nz], p[nz], bar[no];
-        point(v, natural_old, q, z_old);
-        Kin::strain(z_old, e_old);
-        Kin::strain_gradient(z_old, b_old);
-        Dual<no> eo[ne], so[at_least_one(ns)], td[nt], pd[np];
-        for (int c = 0; c < ne; ++c) eo[c] = Dual<no>::variable(e_old[c], c);
-        for (int c = 0; c < ns; ++c) so[c] = Dual<no>::variable(s_old[q * ns + c], ne + c);
-        for (int c = 0; c < nt; ++c) td[c] = Dual<no>::variable(theta(v, q)[c], ne + ns + c);
-        law.template prepare<Dual<no>>(eo, so, td, rest(v, q), v.dt, pd);
-        for (int k = 0; k < no; ++k) {
-          bar[k] = 0;
-          for (int c = 0; c < np; ++c) bar[k] += prepared_bar[c] * pd[c].d[k];
-        }
-        for (int i = 0; i < nz; ++i) {
-          p[i] = 0;
-          for (int c = 0; c < ne; ++c) p[i] += bar[c] * b_old[c][i];
-          p[i] /= v.weight[q];
-        }
-        put_point(v, p, q, out);
-        for (int c = 0; c < ns; ++c) s_old_bar[q * ns + c] = bar[ne + c];
-        for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] += bar[ne + ns + c];
-      }
-    }
-    if constexpr (np > 0) scatter<R>(v, out, u_old_bar);
+      Points::adjoint_step_by_points(law, v, u, u_old, s_old, prepared, adj, s_bar, u_old_bar, s_old_bar,
+                                     theta_bar);
   }
 };
 

@@ -20,6 +20,7 @@
 #include "sim/math/sym3.h"
 #include "sim/terms/damper.h"
 #include "sim/terms/skin_response.h"
+#include "sim/terms/skin_tangent.h"
 
 namespace rhytid {
 inline namespace RHYTID_ISA {
@@ -120,7 +121,7 @@ struct SkinLaw {
   void prepare(const T* y_old, const T* history, const T* theta, const double*, double dt,
                T* prepared) const {
     const Damper<T> d = damper(scheme, theta[SkinTheta::tau], dt);
-    if (scheme == DamperScheme::exponential || scheme == DamperScheme::strang) {
+    if (has_lookback()) {
       T ybar[6];
       isochoric(y_old, ybar);
       geometric_mean(history, ybar, d.pre, prepared);
@@ -179,6 +180,20 @@ struct SkinLaw {
     const V equilibrium_energy = equilibrium_response(y, of_y, theta, volume, sigma, tangent);
     return equilibrium_energy +
            maxwell_response(of_x, m, V(constants[0] * theta[SkinTheta::mu_m]), sigma, tangent);
+  }
+  /// Derivatives of a step in closed form (packed_tangent.h); the constants are DamperSlopes.
+  static constexpr int num_tangent_constants = DamperSlopes::count;
+  void tangent_constants(const double* theta, double dt, double* c) const {
+    const Damper<Dual<1>> d = damper(scheme, Dual<1>::variable(theta[SkinTheta::tau], 0), dt);
+    c[DamperSlopes::pre] = d.pre.v, c[DamperSlopes::pre_slope] = d.pre.d[0];
+    c[DamperSlopes::weight] = d.weight.v, c[DamperSlopes::weight_slope] = d.weight.d[0];
+    c[DamperSlopes::post] = d.post.v, c[DamperSlopes::post_slope] = d.post.d[0];
+  }
+  /// The damper advances toward the old strain before the step.
+  bool has_lookback() const { return scheme == DamperScheme::exponential || scheme == DamperScheme::strang; }
+  template <class V>
+  SkinTangent<V> tangent_at(const TangentPoint<V>& point) const {
+    return SkinTangent<V>(point, has_lookback(), volume);
   }
   /// The energy density again, and the Mandel stress M = C S; jm1 = J − 1.
   template <class V>
@@ -239,6 +254,13 @@ struct ElasticSkinLaw {
     SpringState<V> s;
     spring_state(y, s);
     return equilibrium_response(y, s, theta, volume, sigma, tangent);
+  }
+  static constexpr int num_tangent_constants = 0;
+  void tangent_constants(const double*, double, double*) const {}
+  static bool has_lookback() { return false; }
+  template <class V>
+  ElasticSkinTangent<V> tangent_at(const TangentPoint<V>& point) const {
+    return ElasticSkinTangent<V>(point, volume);
   }
   template <class V>
   V mandel(const V* y, const V& jm1, const V* prepared, const V* theta, const V* constants, V (*m)[3]) const {

@@ -1,4 +1,6 @@
 // A term in a sweep: tangent and adjoint blocks of a converged step.
+#include <algorithm>
+#include <array>
 #include <optional>
 
 #include "sim/terms/element_loop.h"
@@ -8,6 +10,7 @@ namespace rhytid {
 void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorXd& u, const VectorXd& u_old,
                    const double* s_old, const Directions& dir, double* df, double* ds_new) const {
   constexpr int D = kDirections;
+  using ElementDirections = std::array<double, std::size_t{3} * D * kMaxElementNodes>;
   const int nt = kernels_->ntheta, ns = kernels_->ns;
   if (!df && (ns == 0 || !ds_new)) return;
   ++counters_.tangent;
@@ -15,15 +18,16 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
   for (const VectorXd* direction : dir.dnative)
     dtheta.push_back(load_theta_direction(step, data, *direction));
   // Parameter directions at the points of an element, [nq][nt][D]; empty without any.
-  const auto element_dtheta = [&](std::size_t gi, const TermElement& e) {
+  const auto element_dtheta = [&](std::size_t gi, int element) {
+    const int nq = groups_[gi].num_points;
     std::vector<double> dth;
     if (dtheta.empty()) return dth;
-    dth.assign(static_cast<std::size_t>(e.group.num_points) * nt * D, 0.0);
+    dth.assign(static_cast<std::size_t>(nq) * nt * D, 0.0);
     for (std::size_t k = 0; k < dtheta.size(); ++k) {
       const auto& values = dtheta[k][gi];
       const bool per_point = values.size() > static_cast<std::size_t>(nt);
-      const std::size_t first = static_cast<std::size_t>(e.index) * e.group.num_points;
-      for (int q = 0; q < e.group.num_points; ++q)
+      const std::size_t first = static_cast<std::size_t>(element) * nq;
+      for (int q = 0; q < nq; ++q)
         for (int s = 0; s < nt; ++s)
           dth[(static_cast<std::size_t>(q) * nt + s) * D + k] = values[per_point ? (first + q) * nt + s : s];
     }
@@ -31,17 +35,22 @@ void Term::tangent(const StepInfo& step, const TermStepData& data, const VectorX
   };
   for (std::size_t gi = 0; gi < groups_.size(); ++gi) {
     const TermGroup& g = groups_[gi];
-    const std::size_t width = static_cast<std::size_t>(3) * g.num_nodes * D;
     std::optional<ElementVectors> forces;
     if (df) forces.emplace(g, 3 * D);
+    // What elements share is spread over the points once.
+    const bool by_point = std::any_of(dtheta.begin(), dtheta.end(), [&](const auto& direction) {
+      return direction[gi].size() > static_cast<std::size_t>(nt);
+    });
+    const std::vector<double> shared = by_point ? std::vector<double>() : element_dtheta(gi, 0);
     for_elements(*this, gi, step, data, [&](const TermElement& e) {
-      std::vector<double> du(dir.du ? width : 0), du_old(dir.du_old ? width : 0);
+      ElementDirections du, du_old;  // not set to zero: only what belongs to the element's nodes is read
       if (dir.du) e.gather(dir.du, 3 * D, du.data());
       if (dir.du_old) e.gather(dir.du_old, 3 * D, du_old.data());
-      const std::vector<double> dth = element_dtheta(gi, e);
+      const std::vector<double> own = by_point ? element_dtheta(gi, e.index) : std::vector<double>();
+      const std::vector<double>& dth = by_point ? own : shared;
       kernels_->tangent(law_.get(), e.view, e.gather(u).data(), e.gather(u_old).data(),
-                        s_old ? s_old + e.point * ns : nullptr, dir.du ? du.data() : nullptr,
-                        dir.du_old ? du_old.data() : nullptr,
+                        s_old ? s_old + e.point * ns : nullptr, data.prepared.data() + e.point * kernels_->np,
+                        dir.du ? du.data() : nullptr, dir.du_old ? du_old.data() : nullptr,
                         dir.ds_old ? dir.ds_old + e.point * ns * D : nullptr,
                         dth.empty() ? nullptr : dth.data(), df ? forces->of(e) : nullptr,
                         ds_new ? ds_new + e.point * ns * D : nullptr);

@@ -10,6 +10,7 @@ struct LaneFunctions {
   int lanes;
   void (*log1p)(const double* x, double* out, int count);
   void (*expm1)(const double* x, double* out, int count);
+  void (*sinhc)(const double* x, double* out, int count);
   void (*log_quotients)(const double* a, const double* b, const double* difference, double* log,
                         double* slope, int count);
   /// ordinary: 1 where it is, else 0.

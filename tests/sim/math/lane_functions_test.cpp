@@ -108,6 +108,28 @@ TEST(LaneFunctions, Expm1) {
   }
 }
 
+TEST(LaneFunctions, Sinhc) {
+  std::mt19937 rng(5);
+  const auto exact = [](long double x) { return std::sinh(x) / x; };
+  for (const LaneFunctions& f : instruction_sets()) {
+    const double tiny = worst_ulps(f.sinhc, exact, spread(rng, 1e-300, 1e-3, true)),
+                 usual = worst_ulps(f.sinhc, exact, spread(rng, 1e-3, 1, true)),
+                 around = worst_ulps(f.sinhc, exact, spread(rng, 0.5, 2, true)),
+                 large = worst_ulps(f.sinhc, exact, spread(rng, 1, 700, true));
+    std::printf("%s: sinhc to %.2f ulp (tiny), %.2f (usual), %.2f (around 1), %.2f (large)\n", f.isa, tiny,
+                usual, around, large);
+    EXPECT_LE(std::max({tiny, usual, around, large}), 4);
+    const Numbers edges = {0, -0.0, std::nan(""), 1, -1, 1, 1, 1};
+    Numbers out(8);
+    f.sinhc(edges.data(), out.data(), 8);
+    EXPECT_EQ(out[0], 1);
+    EXPECT_EQ(out[1], 1);
+    EXPECT_TRUE(std::isnan(out[2]));
+    EXPECT_NEAR(out[3], std::sinh(1.0), 1e-15);
+    EXPECT_EQ(out[3], out[4]);
+  }
+}
+
 /// Logarithm of a quotient whose terms differ by a given number, which need not be representable by them.
 TEST(LaneFunctions, LogQuotients) {
   std::mt19937 rng(3);

@@ -12,17 +12,6 @@
 #include "sim/terms/geometry.h"
 #include "sim/terms/term.h"
 
-namespace rhytid {
-// Those that this build has: tests ask has_instructions() before they use one.
-#define RHYTID_DECLARE_TABLES(isa)                                                    \
-  extern const KernelTable skin_table_##isa, elastic_table_##isa, volume_table_##isa, \
-      pre_stretched_skin_table_##isa, pre_stretched_elastic_table_##isa;
-RHYTID_DECLARE_TABLES(baseline)
-RHYTID_DECLARE_TABLES(avx2)
-RHYTID_DECLARE_TABLES(avx512)
-#undef RHYTID_DECLARE_TABLES
-}  // namespace rhytid
-
 namespace rhytid::test {
 
 /// 2 × 1 mm, two faces, bent, bottom and top nodes moved at random: truly curved elements.

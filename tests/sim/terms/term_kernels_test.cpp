@@ -4,34 +4,12 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "sim/terms/kernel_choice.h"
+#include "prism_tables.h"
 #include "term_cases.h"
 #include "tests/support/convergence.h"
 
 namespace rhytid::test {
 namespace {
-
-/// The prism kernels of one instruction set.
-struct PrismTables {
-  std::string isa;
-  const KernelTable &skin, &elastic, &volume, &pre_stretched_skin, &pre_stretched_elastic;
-};
-#define RHYTID_PRISM_TABLES(isa)                                                                     \
-  PrismTables {                                                                                      \
-#isa, skin_table_##isa, elastic_table_##isa, volume_table_##isa, pre_stretched_skin_table_##isa, \
-        pre_stretched_elastic_table_##isa                                                            \
-  }
-/// All that this machine and build have, the portable ones first.
-std::vector<PrismTables> instruction_sets() {
-  std::vector<PrismTables> all = {RHYTID_PRISM_TABLES(baseline)};
-#ifdef RHYTID_HAVE_AVX2
-  if (has_instructions("avx2")) all.push_back(RHYTID_PRISM_TABLES(avx2));
-#endif
-#ifdef RHYTID_HAVE_AVX512
-  if (has_instructions("avx512")) all.push_back(RHYTID_PRISM_TABLES(avx512));
-#endif
-  return all;
-}
 
 std::vector<TermCase> all_cases() {
   std::vector<TermCase> cases;
