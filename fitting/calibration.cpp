@@ -8,6 +8,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "fitting/identifiability.h"
+#include "fitting/median.h"
 #include "sim/core/error.h"
 #include "sim/output/text.h"
 #include "sim/solve/cholmod_session.h"
@@ -181,11 +182,6 @@ class Fitter {
   std::vector<Points3> object_;
   std::vector<Points2> image_;
 };
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 void require_enough(const std::vector<CalibrationPhotograph>& photographs, std::size_t used) {
   if (used >= kLeastPhotographs) return;

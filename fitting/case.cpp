@@ -55,6 +55,8 @@ FitCase read_fit(const json& j) {
     if (w.contains("longest")) line.band.longest = w["longest"];
     c.wrinkles = line;
   }
+  if (j.contains("waves"))
+    c.waves = WaveBand{j["waves"]["shortest"], j["waves"]["longest"], j["waves"]["tolerance"]};
   for (const json& region : j.value("still", json::array())) {
     StillRegion r{region["name"]};
     for (int a = 0; a < 3; ++a) r.low[a] = region["box"]["low"][a], r.high[a] = region["box"]["high"][a];
@@ -341,6 +343,9 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
   if (c.fit.wrinkles && !(c.fit.wrinkles->band.shortest < c.fit.wrinkles->band.longest))
     throw InputError(located.where("/fit/wrinkles/longest") + ": /fit/wrinkles/longest",
                      shown_json(located.json["fit"]["wrinkles"]["longest"]), "more than shortest");
+  if (c.fit.waves && !(c.fit.waves->shortest < c.fit.waves->longest))
+    throw InputError(located.where("/fit/waves/longest") + ": /fit/waves/longest",
+                     shown_json(located.json["fit"]["waves"]["longest"]), "more than shortest");
   for (std::size_t i = 0; i < c.fit.still.size(); ++i)
     if (!(c.fit.still[i].low.array() < c.fit.still[i].high.array()).all()) {
       const std::string pointer = "/fit/still/" + std::to_string(i) + "/box";

@@ -28,6 +28,7 @@
 
 #include "fitting/head_motion.h"
 #include "fitting/measurements.h"
+#include "fitting/wave_spectrum.h"
 #include "sim/scene/located_json.h"
 #include "sim/scene/parameter.h"
 
@@ -100,6 +101,7 @@ struct FitCase {
   /// Where tracked points stand still on the head: its motion is taken out by them. Empty: it stands still.
   std::vector<StillRegion> still;
   std::optional<WrinkleLine> wrinkles;  ///< where measured wrinkles are
+  std::optional<WaveBand> waves;        ///< waves of the tracks that are compared besides their points
   /// Further starts, see fitting/starts.h.
   int starts = 1;           ///< with the case's own
   int local_fits = 3;       ///< searches at most, from the best of them

@@ -9,6 +9,7 @@
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
 #include "fitting/further_views.h"
+#include "fitting/median.h"
 #include "fitting/path_deviations.h"
 #include "fitting/profile.h"
 #include "fitting/stages.h"
@@ -20,12 +21,6 @@ namespace {
 
 /// A stage only says where to begin: a step that lowers F by less is not worth its run.
 constexpr double kStageDecrease = 1e-2;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
 
 std::string status_text(const OptimiserOutcome& outcome) {
   using Status = OptimiserOutcome::Status;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fitting/fit.h"
+#include "fitting/measured_unit.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 #include "sim/scene/parameter.h"
@@ -88,13 +89,13 @@ std::string measured_lines(const FitResult& result) {
     Sum& sum = sums[m.quantity];
     ++sum.count;
     sum.squares += (m.value - m.predicted) * (m.value - m.predicted);
-    sum.whitened += std::pow((m.value - m.predicted) / m.sigma, 2);
+    if (m.sigma > 0) sum.whitened += std::pow((m.value - m.predicted) / m.sigma, 2);
   }
   std::string text;
   for (const auto& [quantity, sum] : sums)
     text += quantity + ": " + std::to_string(sum.count) + " values, off by " +
-            number(std::sqrt(sum.squares / sum.count)) + (quantity.starts_with("force_") ? " N" : " mm") +
-            " rms, " + number(std::sqrt(sum.whitened / sum.count)) + " of their deviations.\n";
+            number(std::sqrt(sum.squares / sum.count)) + " " + measured_unit(quantity) + " rms, " +
+            number(std::sqrt(sum.whitened / sum.count)) + " of their deviations.\n";
   return text;
 }
 
@@ -210,6 +211,14 @@ std::string profile_table(const FitResult& result) {
                         (open.empty() ? "" : " (open " + open + ")"),
                     number(profile.linear_low95) + " .. " + number(profile.linear_high95),
                     std::to_string(profile.forward_runs)});
+    for (const DerivedProfile& d : derived_profiles(result, profile)) {
+      open = d.bounded_below ? "" : "below";
+      if (!d.bounded_above) open += open.empty() ? "above" : " and above";
+      rows.push_back(
+          {d.name, d.unit, number(d.value),
+           number(d.low95) + " .. " + number(d.high95) + (open.empty() ? "" : " (open " + open + ")"),
+           number(d.linear_low95) + " .. " + number(d.linear_high95), ""});
+    }
     if (!profile.warning.empty()) warnings += "Warning: " + profile.warning + ".\n";
   }
   return layout(rows) + "Both without what elements, steps and held parameters add to the interval above.\n" +

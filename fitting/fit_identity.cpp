@@ -79,6 +79,8 @@ std::string parameters_digest(const FitCase& fit, const Parametrisation& paramet
     for (const double x :
          {static_cast<double>(rule.from), static_cast<double>(rule.to), rule.weight, rule.half_every})
       d.number(x);
+  if (fit.waves)
+    for (const double x : {fit.waves->shortest, fit.waves->longest, fit.waves->tolerance}) d.number(x);
   if (fit.clip_weight != 1) d.number(fit.clip_weight);
   for (const StillRegion& region : fit.still) {
     d.matrix(region.low);

@@ -83,6 +83,7 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
           o.covariance += motion->pixel_covariance(o.frame, point);
     }
     ComparedTrack compared{r.track, camera, track.at(0)->pixel, {}, {}};
+    const double of_first = with_floor(track.at(0)->covariance, floor).trace() / 2;
     std::vector<const Observation*> used_observations;
     std::vector<double> weights;
     for (const Observation& o : track.observations) {
@@ -93,6 +94,8 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
       weights.push_back(weight);
       compared.frames.push_back(o.frame);
       compared.observed.push_back(o.pixel);
+      compared.variances.push_back((of_first + with_floor(o.covariance, floor).trace() / (2 * weight)) /
+                                   fit.clip_weight);
       used_observations.push_back(&o);
     }
     if (compared.frames.empty()) continue;
@@ -102,6 +105,20 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
     compared_.push_back(std::move(compared));
     registration_.tracks.push_back(r);
   }
+}
+
+std::vector<WavePoint> FitProblem::wave_points() const {
+  const std::vector<Vec3> rest = rest_points();
+  std::vector<WavePoint> points;
+  for (std::size_t i = 0; i < compared_.size(); ++i) {
+    const ComparedTrack& c = compared_[i];
+    WavePoint& p = points.emplace_back();
+    p.rest = rest[i], p.camera = c.camera, p.frames = c.frames, p.variances = c.variances;
+    p.moved.resize(2 * static_cast<Eigen::Index>(c.frames.size()));
+    for (std::size_t j = 0; j < c.frames.size(); ++j)
+      p.moved.segment<2>(2 * static_cast<Eigen::Index>(j)) = c.observed[j] - c.first;
+  }
+  return points;
 }
 
 void FitProblem::require_observations(const FitCase& fit, const std::vector<Camera>& cameras) const {

@@ -72,6 +72,7 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
   if (!measured.empty()) measured_.emplace(model_.model(), measured, fit.wrinkles, options_.frames);
   predict_by(cameras);
 
+  if (fit.waves) waves_.emplace(wave_points(), *fit.waves), num_residuals_ += waves_->size();
   for (const TrackNoise& n : noise_) num_residuals_ += n.num_rows();
   if (measured_) num_residuals_ += static_cast<int>(measured_->values().size());
   for (const FitVariable& v : parametrisation_.variables()) num_residuals_ += v.prior_sigma ? 1 : 0;
@@ -229,6 +230,11 @@ void FitProblem::compare(const VectorXd& predicted) {
   if (!evaluation_.measured.allFinite()) return fail("a measured quantity has no value");
   evaluation_.residuals.segment(row, evaluation_.measured.size()) = evaluation_.measured;
   row += evaluation_.measured.size();
+  if (waves_) {
+    evaluation_.waves = waves_->residuals(evaluation_.differences);
+    evaluation_.residuals.segment(row, evaluation_.waves.size()) = evaluation_.waves;
+    row += evaluation_.waves.size();
+  }
   for (int k = 0; k < num_parameters(); ++k)
     if (const auto& prior = parametrisation_.variables()[k].prior_sigma)
       evaluation_.residuals[row++] = (t_[k] - parametrisation_.initial()[k]) / *prior;
@@ -338,6 +344,10 @@ std::optional<MatrixXd> FitProblem::jacobian(const VectorXd& t) {
   }
   out.middleRows(row, measured_jacobian_.rows()) = measured_jacobian_;
   row += measured_jacobian_.rows();
+  if (waves_) {
+    out.middleRows(row, waves_->size()) = waves_->jacobian(evaluation_.differences, *dr);
+    row += waves_->size();
+  }
   for (int k = 0; k < num_parameters(); ++k)
     if (const auto& prior = parametrisation_.variables()[k].prior_sigma) out(row++, k) = 1 / *prior;
   return out;
@@ -357,6 +367,10 @@ std::optional<FitProblem::Linearised> FitProblem::linearised(const VectorXd& t) 
   }
   out.jacobian.middleRows(row, measured_jacobian_.rows()) = measured_jacobian_;
   row += measured_jacobian_.rows();
+  if (waves_) {
+    out.residuals.segment(row, waves_->size()).setZero();
+    row += waves_->size();
+  }
   for (int k = 0; k < num_parameters(); ++k)
     if (const auto& prior = parametrisation_.variables()[k].prior_sigma) out.jacobian(row++, k) = 1 / *prior;
   return out;
@@ -367,9 +381,12 @@ std::optional<VectorXd> FitProblem::gradient(const VectorXd& t) {
   const auto sweep = [&]() -> MatrixXd {
     std::vector<VectorXd> weights(frames() + 1);
     for (int f = 0; f <= frames(); ++f) weights[f] = VectorXd::Zero(output_->size(f));
+    const std::vector<VectorXd> of_waves =
+        waves_ ? waves_->gradient(evaluation_.differences) : std::vector<VectorXd>();
     for (std::size_t i = 0; i < compared_.size(); ++i)
       for (std::size_t j = 0; j < compared_[i].frames.size(); ++j) {
-        const Vec2 gradient = evaluation_.tracks[i].gradient.segment<2>(2 * j);
+        Vec2 gradient = evaluation_.tracks[i].gradient.segment<2>(2 * j);
+        if (waves_) gradient += of_waves[i].segment<2>(2 * j);
         weights[compared_[i].frames[j]].segment<2>(output_row_[i][j]) = -gradient;
         if (options_.settle) weights[0].segment<2>(first_prediction(i)) += gradient;
       }

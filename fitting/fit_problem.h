@@ -3,7 +3,7 @@
 //
 //   F(t) = Σ_tracks cost(observed − predicted(t)) + ½ Σ ((measured − predicted(t)) / σ)²
 //          + ½ Σ ((t_k − t_k,initial) / prior_k)²
-//   residuals z with F = ½|z|²;  rows: tracks one after the other, then measurements, then priors
+//   residuals z with F = ½|z|²;  rows: tracks one after the other, measurements, waves (wave_spectrum.h), priors
 //
 // The last run is kept: value, Jacobian and gradient at the same t share it. With a log, what it holds is
 // taken from there instead of being computed, and what is computed is added to it. Tests:
@@ -22,6 +22,7 @@
 #include "fitting/projected_points.h"
 #include "fitting/registration.h"
 #include "fitting/track_noise.h"
+#include "fitting/wave_spectrum.h"
 #include "sim/time/simulate.h"
 
 namespace rhytid::fitting {
@@ -30,6 +31,7 @@ struct FitEvaluation : ObjectiveEvaluation {
   std::vector<VectorXd> differences;           ///< per track: observed − predicted [2n], px
   std::vector<TrackNoise::Evaluation> tracks;  ///< per track
   VectorXd measured;                           ///< (measured − predicted)/σ of the measurements
+  VectorXd waves;                              ///< residuals of the wave spectrum
 };
 
 /// Called after every forward run.
@@ -71,7 +73,8 @@ class FitProblem final : public Objective {
   const FitEvaluation& evaluate(const VectorXd& t) override;
   std::optional<MatrixXd> jacobian(const VectorXd& t) override;  ///< by the tangent sweep
   std::optional<VectorXd> gradient(const VectorXd& t) override;  ///< by the adjoint sweep
-  /// Residuals and Jacobian whitened with robust weights held fixed, for covariance estimates.
+  /// Residuals and Jacobian whitened with robust weights held fixed, for covariance estimates. Rows of waves are zero:
+  /// their noise is that of the tracks, which is there already.
   struct Linearised {
     VectorXd residuals;
     MatrixXd jacobian;
@@ -89,6 +92,7 @@ class FitProblem final : public Objective {
     Vec2 first;      ///< its pixel in frame 0, where it was attached
     std::vector<int> frames;
     std::vector<Vec2> observed;
+    std::vector<double> variances = {};  ///< px² per axis of what it has moved since frame 0
   };
   const std::vector<ComparedTrack>& compared() const { return compared_; }
   const std::vector<Camera>& cameras() const { return prediction_->cameras(); }
@@ -101,6 +105,8 @@ class FitProblem final : public Objective {
     return measured_ ? measured_->values() : std::vector<MeasuredQuantities::Value>();
   }
   const std::vector<TrackNoise>& noise() const { return noise_; }
+  /// Waves of the tracks; nothing where they are not compared.
+  const std::optional<WaveSpectrum>& waves() const { return waves_; }
 
   struct Counters {
     int forward_runs = 0, failed_runs = 0, tangent_sweeps = 0, adjoint_sweeps = 0;
@@ -124,6 +130,7 @@ class FitProblem final : public Objective {
   /// Attaches the tracks of one camera, still ones to the head and the others to the skin.
   void attach(const Scene& scene, const FitCase& fit, const Camera& camera, int number,
               const TrackSet& tracks, const SkinMesh& seen_first);
+  std::vector<WavePoint> wave_points() const;
   void require_observations(const FitCase& fit, const std::vector<Camera>& cameras) const;
   void run(const VectorXd& t);
   /// Simulates at t_ and projects: predicted pixels of all frames below one another, [rows][1].
@@ -157,6 +164,7 @@ class FitProblem final : public Objective {
   std::vector<TrackNoise> noise_;
   std::shared_ptr<ProjectedPoints> prediction_;
   std::optional<MeasuredQuantities> measured_;
+  std::optional<WaveSpectrum> waves_;
   std::shared_ptr<const adjoint::Output> output_;  ///< pixels of a frame, then what was measured
   /// Row of (track, observation) in its frame's output, in the order of compared_.
   std::vector<std::vector<int>> output_row_;

@@ -51,6 +51,8 @@ void fields(Archive& field, Record& d) {
   field("low95", d.low95);
   field("high95", d.high95);
   field("truth", d.truth);
+  field.optional("follows", d.follows);
+  if (!d.follows.empty()) field("power", d.power);
 }
 
 template <class Archive, Writable<FitIteration> Record>
@@ -227,9 +229,9 @@ class Writer {
   void operator()(const char* key, const T& value) {
     out[key] = json(value);
   }
-  /// A list that files without it leave empty.
+  /// A list or a text that files without it leave empty.
   template <class T>
-  void optional(const char* key, const std::vector<T>& list) {
+  void optional(const char* key, const T& list) {
     if (!list.empty()) out[key] = json(list);
   }
 
@@ -274,7 +276,7 @@ class Reader {
     read(*found, value, where);
   }
   template <class T>
-  void optional(const char* key, std::vector<T>& list) {
+  void optional(const char* key, T& list) {
     list.clear();
     if (const auto found = in_.find(key); found != in_.end()) read(*found, list, where_ + "/" + key);
   }
@@ -382,6 +384,23 @@ void check_sizes(const FitResult& result, const std::string& where) {
 }
 
 }  // namespace
+
+std::vector<DerivedProfile> derived_profiles(const FitResult& result, const ParameterProfile& profile) {
+  std::vector<DerivedProfile> found;
+  for (const FittedParameter& p : result.parameters)
+    for (const DerivedQuantity& d : result.derived) {
+      if (p.address != profile.address || d.follows != p.address || !(p.value > 0)) continue;
+      const auto at = [&](double value) { return d.value * std::pow(value / p.value, d.power); };
+      DerivedProfile& out = found.emplace_back(DerivedProfile{
+          d.name, d.unit, d.value, at(profile.low95), at(profile.high95), at(profile.linear_low95),
+          at(profile.linear_high95), profile.bounded_below, profile.bounded_above});
+      if (d.power > 0) continue;
+      std::swap(out.low95, out.high95);
+      std::swap(out.linear_low95, out.linear_high95);
+      std::swap(out.bounded_below, out.bounded_above);
+    }
+  return found;
+}
 
 std::string FitResult::address_in_clip(const FittedParameter& parameter, int clip) const {
   const std::string& address = parameter.address;

@@ -28,6 +28,9 @@ struct DerivedQuantity {
   std::string name, unit;
   double value = 0, low95 = 0, high95 = 0;
   std::optional<double> truth;
+  /// Address of the only fitted parameter that it hangs on, and its power there (1 or −1); empty with several.
+  std::string follows = {};
+  double power = 1;
 };
 
 /// By how much the answer would move with one kind of step of the discretisation finer (discretisation.h), or
@@ -141,6 +144,15 @@ struct FittedClip {
   std::vector<FittedView> views;
   std::string scene_file, fitted_scene_file;  ///< as those of FitResult
 };
+
+struct FitResult;
+/// What a profile says of a quantity that hangs on its parameter alone.
+struct DerivedProfile {
+  std::string name, unit;
+  double value = 0, low95 = 0, high95 = 0, linear_low95 = 0, linear_high95 = 0;
+  bool bounded_below = true, bounded_above = true;
+};
+std::vector<DerivedProfile> derived_profiles(const FitResult& result, const ParameterProfile& profile);
 
 struct FitResult {
   std::string case_name, case_file, optimiser, status;  ///< status: converged | max_evaluations | failed: ...

@@ -119,6 +119,37 @@ void add_clip(const TrackSet& tracks, const FitProblem& problem, const FitEvalua
   clip.rms_px = std::sqrt(clip.rms_px / std::max(1, clip.num_observations));
 }
 
+/// What waves there are in the tracks of clip c and in the prediction.
+void add_waves(JointProblem& problem, int c, const VectorXd& t, FitResult& result) {
+  FitProblem& clip = problem.clip(c);
+  if (!clip.waves()) return;
+  const std::vector<WaveDescription> tracked = clip.waves()->tracked(),
+                                     predicted = clip.waves()->predicted(
+                                         clip.evaluate(problem.of_clip(c, t)).differences);
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    const WaveDescription &a = tracked[i], &b = predicted[i];
+    const std::string camera = clip.cameras().size() > 1 ? "_" + clip.cameras()[a.camera].name : "";
+    constexpr double kDegrees = 57.29577951308232;
+    double turned = std::remainder(b.direction - a.direction, 3.141592653589793);
+    result.measured.push_back(
+        {c, a.frame, "waves_amplitude" + camera, a.amplitude, a.amplitude_sigma, b.amplitude});
+    if (a.amplitude < 3 * a.amplitude_sigma) continue;  // nothing to describe
+    result.measured.push_back(
+        {c, a.frame, "waves_length" + camera, a.wavelength, a.wavelength_sigma, b.wavelength});
+    result.measured.push_back({c, a.frame, "waves_direction" + camera, kDegrees * a.direction,
+                               kDegrees * a.direction_sigma, kDegrees * (a.direction + turned)});
+  }
+  const Eigen::Matrix<double, 3, 2>& plane = clip.waves()->plane();
+  result.notes.push_back((clip.name.empty() ? std::string() : "Clip " + clip.name + ": ") +
+                         "Waves in what tracks have moved were compared besides their points, by wave vector "
+                         "and not by phase; directions are "
+                         "from (" +
+                         number("%.2f, ", plane(0, 0)) + number("%.2f, ", plane(1, 0)) +
+                         number("%.2f", plane(2, 0)) + ") toward (" + number("%.2f, ", plane(0, 1)) +
+                         number("%.2f, ", plane(1, 1)) + number("%.2f", plane(2, 1)) +
+                         "). They lead the fit; the intervals are those of the points.");
+}
+
 }  // namespace
 
 NoiseCheck check_noise(JointProblem& problem, const VectorXd& t, const VectorXd& whitened) {
@@ -213,6 +244,10 @@ void add_modulus_ratios(const JointProblem& problem, const Identifiability& foun
                           .unit = "",
                           .value = modulus(layer.name) / modulus(base),
                           .truth = {}};
+    if ((above < 0) != (below < 0)) {
+      ratio.follows = problem.variables()[std::max(above, below)].address;
+      ratio.power = above >= 0 ? 1 : -1;
+    }
     ratio.low95 = ratio.value * std::exp(-half);
     ratio.high95 = ratio.value * std::exp(half);
     const double true_ratio = true_modulus(layer.name) / true_modulus(base);
@@ -261,6 +296,7 @@ void add_residuals(const JointFitInput& input, JointProblem& problem, const Vect
                                  m.value - m.sigma * at.measured[static_cast<Eigen::Index>(i)]});
     }
   }
+  for (int c = 0; c < problem.num_clips(); ++c) add_waves(problem, c, t, result);
   double sum = 0;
   for (int c = 0; c < problem.num_clips(); ++c) {
     FittedClip clip;

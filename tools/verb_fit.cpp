@@ -158,8 +158,11 @@ class Fit : public Verb {
 
   static int most_runs(const fitting::FitCase& options) {
     if (!options.profiles.empty()) return 0;  // not known
-    if (options.starts == 1) return options.max_evaluations;
-    return options.starts + std::min(options.starts, options.local_fits) * options.max_evaluations;
+    int before = 0;  // and one run at either end of the stages, to see which is better
+    for (const fitting::StageCase& stage : options.stages) before += stage.max_evaluations;
+    if (before > 0) before += 2;
+    if (options.starts == 1) return before + options.max_evaluations;
+    return before + options.starts + std::min(options.starts, options.local_fits) * options.max_evaluations;
   }
 
   static fitting::FitObserver observer(VerbContext& context, const fitting::FitCase& options) {
@@ -175,13 +178,15 @@ class Fit : public Verb {
       if (std::exchange(is_first, false)) progress.stage("fit", most_runs(options));
     };
     o.note = [&progress](const std::string& text) { progress.note(text); };
-    o.run = [&progress](const fitting::FitProgress& p) {
+    // Stages, starts and the fit count their own runs; here is how many there were in all.
+    o.run = [&progress, runs = 0](const fitting::FitProgress& p) mutable {
+      ++runs;
       std::string values;
       for (const double v : p.values) values += " " + text_of("%.4g", v);
-      progress.note("run " + std::to_string(p.forward_runs) + " (" + text_of("%.1f", p.seconds) +
+      progress.note("run " + std::to_string(runs) + " (" + text_of("%.1f", p.seconds) +
                     (p.replayed ? " s then): " : " s): ") +
                     (p.failed ? "failed: " + p.failure : "cost " + text_of("%.6g", p.cost)) + " at" + values);
-      progress.step_done(p.forward_runs);
+      progress.step_done(runs);
     };
     return o;
   }

@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <limits>
 
+#include "fitting/measured_unit.h"
+#include "fitting/median.h"
 #include "sim/core/error.h"
 #include "sim/output/atomic_file.h"
 
@@ -141,6 +143,39 @@ TEST(FitResult, HeadersCarryUnits) {
   write_fit_result(example(), folder);
   const std::string csv = read_file(folder + "/residuals.csv");
   EXPECT_EQ(csv.substr(0, csv.find('\n')), "frame,track,x_px,y_px,predicted_x_px,predicted_y_px,weight");
+}
+
+TEST(FitResult, QuantitiesHaveUnitsAndListsAMedian) {
+  EXPECT_STREQ(measured_unit("force_finger_z"), "N");
+  EXPECT_STREQ(measured_unit("wrinkle_amplitude"), "mm");
+  EXPECT_STREQ(measured_unit("waves_amplitude_left"), "px");
+  EXPECT_STREQ(measured_unit("waves_direction"), "°");
+  EXPECT_EQ(median({}), 0);
+  EXPECT_EQ(median({3, 1, 2}), 2);
+  EXPECT_EQ(median({4, 1, 3, 2}), 3);
+}
+
+// Of a ratio whose other modulus is held, the profile is that of the one that is fitted.
+TEST(FitResult, RatiosHaveTheProfileOfTheirModulus) {
+  FitResult r;
+  r.parameters.resize(1);
+  r.parameters[0].address = "/film", r.parameters[0].value = 0.1;
+  r.derived.resize(3);
+  r.derived[0].value = 5, r.derived[0].follows = "/film";
+  r.derived[1].value = 0.2, r.derived[1].follows = "/film", r.derived[1].power = -1;
+  r.derived[2].value = 3;
+  ParameterProfile profile;
+  profile.address = "/film", profile.low95 = 0.05, profile.high95 = 0.4, profile.bounded_above = false;
+  profile.linear_low95 = 0.08, profile.linear_high95 = 0.12;
+  const std::vector<DerivedProfile> found = derived_profiles(r, profile);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_DOUBLE_EQ(found[0].low95, 2.5);
+  EXPECT_DOUBLE_EQ(found[0].high95, 20);
+  EXPECT_FALSE(found[0].bounded_above);
+  EXPECT_DOUBLE_EQ(found[1].low95, 0.05);
+  EXPECT_DOUBLE_EQ(found[1].high95, 0.4);
+  EXPECT_FALSE(found[1].bounded_below);
+  EXPECT_DOUBLE_EQ(found[1].linear_high95, 0.25);
 }
 
 TEST(FitResult, AnEmptyResultIsAllowed) {

@@ -33,31 +33,42 @@ Camera moved(const Camera& camera, double amount) {
   return c;
 }
 
+/// The point at the depth of `near` that is seen at a pixel.
+Vec3 seen_at(const Camera& camera, const Vec2& pixel, const Vec3& near) {
+  const Ray ray = camera.pixel_ray(pixel);
+  const Vec3 forward = camera.rotation.row(2).transpose();
+  return ray.origin + ray.direction * (forward.dot(near - ray.origin) / forward.dot(ray.direction));
+}
+
 /// A cloud of points with tracks in frames 0..frames, the camera moving, noise of `sigma` px.
 struct Cloud {
   TrackSet tracks;
   std::vector<StillTrack> still;
 };
 
-Cloud make_cloud(int points, int frames, const Camera& camera, double sigma, unsigned seed) {
+/// With noise of `first_sigma` in frame 0 too the points lie where that frame shows them, at their depth.
+Cloud make_cloud(int points, int frames, const Camera& camera, double sigma, unsigned seed,
+                 double first_sigma = 0) {
   std::mt19937 rng(seed);
   std::normal_distribution<double> noise(0, sigma);
   std::uniform_real_distribution<double> place(-10, 10);
   Cloud cloud;
   for (int i = 0; i < points; ++i) {
     const Vec3 x(place(rng), 0.7 * place(rng), 0.2 * place(rng));
+    const Vec2 off = first_sigma > 0 ? first_sigma * Vec2(noise(rng), noise(rng)) / sigma : Vec2(0, 0);
     Track track{i, camera.name, {}};
     for (int f = 0; f <= frames; ++f) {
       Observation o;
       o.frame = f;
       o.status = TrackStatus::ok;
       o.pixel = moved(camera, f).project(x);
-      if (f > 0) o.pixel += Vec2(noise(rng), noise(rng));
-      o.covariance = (f > 0 ? sigma * sigma : 1e-12) * Eigen::Matrix2d::Identity();
+      o.pixel += f > 0 ? Vec2(noise(rng), noise(rng)) : off;
+      o.covariance =
+          (f > 0 ? sigma * sigma : std::max(1e-12, first_sigma * first_sigma)) * Eigen::Matrix2d::Identity();
       track.observations.push_back(o);
     }
     cloud.tracks.tracks.push_back(std::move(track));
-    cloud.still.push_back({i, x});
+    cloud.still.push_back({i, first_sigma > 0 ? seen_at(camera, camera.project(x) + off, x) : x});
   }
   return cloud;
 }
@@ -102,6 +113,21 @@ TEST(HeadMotion, CovarianceIsThatOfTheErrors) {
   std::printf("normalised squares: pose %.3f, pixel %.3f\n", sum / kDraws, pixels / kDraws);
   EXPECT_NEAR(sum / kDraws, 0.93, 0.13);
   EXPECT_NEAR(pixels / kDraws, 0.93, 0.25);
+}
+
+// Frame 0 errs too: it places the points, and that error is in every later frame alike.
+TEST(HeadMotion, CovarianceHasRoomForTheNoiseOfFrameZero) {
+  const Camera camera = test::make_camera();
+  double sum = 0;
+  constexpr int kDraws = 200;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Cloud cloud = make_cloud(25, 1, camera, 0.2, 300 + draw, 0.2);
+    const HeadMotion motion = estimate_head_motion(cloud.tracks, cloud.still, camera, 1, 1e-3, 0);
+    const Vector6d e = difference(moved(camera, 1), motion.cameras[1], motion.middle);
+    sum += e.dot(motion.covariance[1].inverse() * e) / 6;
+  }
+  std::printf("normalised squares with noise in frame 0: %.3f\n", sum / kDraws);
+  EXPECT_NEAR(sum / kDraws, 0.93, 0.13);
 }
 
 TEST(HeadMotion, DiscountsAPointThatMovesAndMissesFrames) {

@@ -1,5 +1,7 @@
 #include "tools/report/html.h"
 
+#include <cstdlib>
+
 #include "sim/core/error.h"
 #include "sim/output/colour_map.h"
 #include "sim/output/text.h"
@@ -42,7 +44,7 @@ table{border-collapse:collapse;font-size:.92rem;font-variant-numeric:tabular-num
 .caption{color:var(--soft);margin:0 0 4px;font-size:.9rem}
 th,td{padding:6px 12px 6px 0;border-bottom:1px solid var(--line);text-align:right;vertical-align:top}
 th{font-weight:600}thead th{vertical-align:bottom}
-.t{text-align:left}.wide td,.wide th{white-space:nowrap}
+tbody td:not(.t){white-space:nowrap}.t{text-align:left}.wide td,.wide th{white-space:nowrap}
 td.c{padding:6px 8px;text-align:center;border:1px solid var(--card)}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:4px 18px;margin:0 0 12px;font-size:.95rem}
 dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
@@ -54,7 +56,8 @@ figure img,figure svg{display:block;width:100%;height:auto;border-radius:6px;bac
 figure svg{max-width:640px}
 .row{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:6px 22px;align-items:start}
 @media(max-width:560px){main,header,nav{padding:0 12px}header{padding-top:20px}section{padding:16px 14px}
-.look{overflow-x:auto}.look svg,.look img{min-width:600px}figcaption::before{content:"Scroll sideways to see all. "}
+.look{overflow-x:auto}.look svg,.look img{min-width:var(--least,600px)}
+.look+figcaption::before{content:"Scroll sideways to see all. "}.whole+figcaption::before{content:none}
 h1{font-size:1.4rem}dl{grid-template-columns:1fr;gap:0}dd{margin-bottom:8px}th,td{padding-right:9px}}
 @media print{:root{color-scheme:light;--page:#fff;--card:#fff;--ink:#000;--soft:#444;--line:#bbb}nav{display:none}
 body{font-size:10.5pt}section{border:0;padding:0}figure,tr,pre{break-inside:avoid}h2,h3{break-after:avoid}
@@ -73,6 +76,14 @@ std::string inline_svg(std::string svg) {
   cut(" role=\"", "\"", true);
   cut("<title>", "</title>", true);
   return svg;
+}
+
+/// Of an <svg>, px; 600 where it does not say.
+double drawn_width(const std::string& svg) {
+  const std::string key = " width=\"";
+  const size_t at = svg.find(key);
+  const double width = at == std::string::npos ? 0 : std::strtod(svg.c_str() + at + key.size(), nullptr);
+  return width > 0 ? width : 600;
 }
 
 }  // namespace
@@ -164,15 +175,21 @@ void HtmlPage::code(const std::string& text) {
 }
 
 void HtmlPage::svg_figure(const std::string& svg, const std::string& alt, const std::string& caption) {
-  body_ += "<figure><div class=\"look\" role=\"img\" aria-label=\"" + xml_escaped(alt) + "\">" +
-           inline_svg(svg) + "</div>\n<figcaption>" + xml_escaped(caption) + "</figcaption></figure>\n";
+  // At 0.72 of what was drawn a chart can still be read (text of 9 px); smaller ones then fit a telephone.
+  constexpr double kLeast = 0.72, kTelephone = 335;
+  const double least = kLeast * drawn_width(svg);
+  body_ += std::string("<figure><div class=\"look") + (least <= kTelephone ? " whole" : "") +
+           "\" style=\"--least:" + (least <= kTelephone ? "0" : fixed_text(least, 0)) +
+           "px\" role=\"img\" aria-label=\"" + xml_escaped(alt) + "\">" + inline_svg(svg) +
+           "</div>\n<figcaption>" + xml_escaped(caption) + "</figcaption></figure>\n";
 }
 
 void HtmlPage::image_figure(const std::string& data_uri, int width, int height, const std::string& alt,
-                            const std::string& caption) {
-  body_ += "<figure><div class=\"look\"><img src=\"" + xml_escaped(data_uri) + "\" width=\"" +
-           std::to_string(width) + "\" height=\"" + std::to_string(height) + "\" alt=\"" + xml_escaped(alt) +
-           "\"></div>\n<figcaption>" + xml_escaped(caption) + "</figcaption></figure>\n";
+                            const std::string& caption, bool has_text) {
+  body_ += std::string("<figure><div class=\"look") + (has_text ? "\"" : " whole\" style=\"--least:0px\"") +
+           "><img src=\"" + xml_escaped(data_uri) + "\" width=\"" + std::to_string(width) + "\" height=\"" +
+           std::to_string(height) + "\" alt=\"" + xml_escaped(alt) + "\"></div>\n<figcaption>" +
+           xml_escaped(caption) + "</figcaption></figure>\n";
 }
 
 void HtmlPage::begin_row() {

@@ -51,10 +51,11 @@ class HtmlPage {
   void table(const HtmlTable& table);
   /// Preformatted text, e.g. a command line.
   void code(const std::string& text);
-  /// One figure: the caption is shown, `alt` says the same to those who cannot see the picture.
+  /// One figure: the caption is shown, `alt` says the same to those who cannot see the picture. On a narrow screen it
+  /// scrolls sideways rather than shrink until its text cannot be read; without text it shrinks.
   void svg_figure(const std::string& svg, const std::string& alt, const std::string& caption);
   void image_figure(const std::string& data_uri, int width, int height, const std::string& alt,
-                    const std::string& caption);
+                    const std::string& caption, bool has_text = true);
   /// Figures between these two stand beside each other where there is room.
   void begin_row();
   void end_row();

@@ -266,6 +266,16 @@ void add_profiles(HtmlPage& page, const FitResult& fit) {
                     p->name + ": " + interval + ".");
     table.rows.push_back({p->name, interval, text(profile.linear_low95, profile.linear_high95),
                           std::to_string(profile.forward_runs)});
+    for (const fitting::DerivedProfile& d : fitting::derived_profiles(fit, profile)) {
+      const int own = digits_for(d.value, d.low95, d.high95);
+      open = d.bounded_below ? "" : ", open below";
+      if (!d.bounded_above) open += open.empty() ? ", open above" : " and above";
+      const auto words = [&](double low, double high) {
+        return short_text(low, own) + " to " + short_text(high, own) + (d.unit.empty() ? "" : " " + d.unit);
+      };
+      table.rows.push_back(
+          {d.name, words(d.low95, d.high95) + open, words(d.linear_low95, d.linear_high95), "–"});
+    }
   }
   page.end_row();
   page.table(table);

@@ -1,6 +1,7 @@
 #include <map>
 #include <utility>
 
+#include "fitting/measured_unit.h"
 #include "sim/output/plot.h"
 #include "tools/report/sections.h"
 
@@ -20,7 +21,7 @@ void add_measured(HtmlPage& page, const ReportData& data) {
     LinePlot plot;
     plot.width = 460, plot.height = 280;
     plot.x.label = "frame";
-    plot.y.label = quantity + (quantity.starts_with("force_") ? " [N]" : " [mm]");
+    plot.y.label = quantity + " [" + fitting::measured_unit(quantity) + "]";
     PlotSeries measured, predicted;
     measured.label = "measured ± 1 deviation", predicted.label = "predicted";
     measured.style = PlotStyle::points, predicted.style = PlotStyle::line_and_points;

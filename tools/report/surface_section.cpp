@@ -32,7 +32,7 @@ void add_footage_frame(HtmlPage& page, const ReportData& data, int frame) {
   cv::resize(*picture, *picture, {}, scale, scale, scale < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
   page.image_figure(jpeg_uri(encode_jpeg(*picture)), picture->cols, picture->rows,
                     "The footage, frame " + std::to_string(frame) + ".",
-                    "Footage, frame " + std::to_string(frame) + ".");
+                    "Footage, frame " + std::to_string(frame) + ".", false);
 }
 
 }  // namespace
@@ -62,7 +62,8 @@ void add_surface(HtmlPage& page, const ReportData& data, const VectorXd& displac
                         ", in raking light that brings out wrinkles. The finger is glass." +
                         (!data.camera ? ""
                          : distorted  ? " Same camera, without its lens distortion."
-                                      : " Same camera."));
+                                      : " Same camera."),
+                    false);
 
   PictureField field;
   field.values = surface.normal_displacement(displacement);

@@ -79,6 +79,20 @@ TEST(HtmlPage, WhatIsWiderThanAPhoneScrollsByKeyboardTooAndSaysSo) {
   EXPECT_THAT(html, HasSubstr("Scroll sideways to see all."));
 }
 
+TEST(HtmlPage, ChartsThatFitAPhoneAndPicturesWithoutTextShrinkToIt) {
+  HtmlPage page("t", "s");
+  page.svg_figure("<svg width=\"460\" height=\"280\"></svg>", "small", "caption");
+  page.svg_figure("<svg width=\"640\" height=\"280\"></svg>", "large", "caption");
+  page.image_figure(png_uri(std::string("\0\1\2", 3)), 900, 2, "photograph", "caption", false);
+  const std::string html = page.finish();
+  EXPECT_EQ(test::html_complaint(html), "");
+  EXPECT_THAT(html,
+              HasSubstr("<div class=\"look whole\" style=\"--least:0px\" role=\"img\" aria-label=\"small\""));
+  EXPECT_THAT(html,
+              HasSubstr("<div class=\"look\" style=\"--least:461px\" role=\"img\" aria-label=\"large\""));
+  EXPECT_THAT(html, HasSubstr("<div class=\"look whole\" style=\"--least:0px\"><img"));
+}
+
 TEST(Wording, UnitsThatReadWell) {
   const ReadableUnit unit = readable_unit(0.0123, "MPa");
   EXPECT_EQ(unit.unit, "kPa");
