@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 std::string bundled(const char* file) {
-  return source_dir() + "/data/scenes/recovery_swipe/" + file;
+  return source_dir() + "/data/scenes/coarse_swipe/" + file;
 }
 
 std::string scene_text(const std::string& collider) {

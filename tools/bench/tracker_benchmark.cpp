@@ -136,7 +136,7 @@ class TrackerBenchmark : public Benchmark {
   void add_options(CLI::App& app) override {
     CLI::Option* of_case =
         app.add_option("case", case_,
-                       "a case whose truth is filmed too, e.g. data/scenes/recovery_swipe/case.json")
+                       "a case whose truth is filmed too, e.g. data/scenes/coarse_swipe/case.json")
             ->option_text("CASE");
     app.add_option("--set", settings_, "change one value of the case; may be repeated")
         ->needs(of_case)
