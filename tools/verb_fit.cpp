@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <ostream>
 #include <utility>
 
@@ -179,8 +180,8 @@ class Fit : public Verb {
     };
     o.note = [&progress](const std::string& text) { progress.note(text); };
     // Stages, starts and the fit count their own runs; here is how many there were in all.
-    o.run = [&progress, runs = 0](const fitting::FitProgress& p) mutable {
-      ++runs;
+    o.run = [&progress, count = std::make_shared<int>(0)](const fitting::FitProgress& p) {
+      const int runs = ++*count;  // copies of this function count on
       std::string values;
       for (const double v : p.values) values += " " + text_of("%.4g", v);
       progress.note("run " + std::to_string(runs) + " (" + text_of("%.1f", p.seconds) +

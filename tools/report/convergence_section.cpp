@@ -127,8 +127,11 @@ void add_convergence(HtmlPage& page, const ReportData& data) {
   }
   page.paragraph("Cost went from " + short_text(data.fit.initial_cost, 4) + " to " +
                  short_text(data.fit.final_cost, 4) + " in " +
-                 counted(static_cast<long>(history.back().iteration), "iteration") + " and " +
-                 counted(data.fit.forward_runs, "forward run") + ".");
+                 counted(static_cast<long>(history.back().iteration), "iteration") + "; " +
+                 counted(data.fit.forward_runs, "forward run") + " in all" +
+                 (data.fit.starts.empty() && data.fit.profiles.empty()
+                      ? "."
+                      : ", those of other starts and of profiles included."));
   LinePlot cost = plot_over_iterations("cost, gradient norm");
   cost.y.logarithmic = true;
   cost.series.push_back(series_of(

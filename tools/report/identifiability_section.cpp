@@ -229,7 +229,9 @@ LinePlot profile_plot(const FittedParameter& p, const ParameterProfile& profile)
     plot.series.push_back(parabola);
   }
   plot.rules.push_back({false, level, "95 %"});
-  if (p.truth && std::isfinite(*p.truth)) plot.rules.push_back({true, *p.truth / unit.scale, "truth"});
+  // Beyond the values that were tried it would only make them narrow; the answer says the truth.
+  if (p.truth && *p.truth >= profile.points.front().value && *p.truth <= profile.points.back().value)
+    plot.rules.push_back({true, *p.truth / unit.scale, "truth"});
   return plot;
 }
 

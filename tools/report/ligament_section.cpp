@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "sim/output/font.h"
 #include "sim/output/picture.h"
@@ -52,13 +53,22 @@ const fitting::FittedParameter* fitted_strength(const fitting::FitResult& fit, c
   return nullptr;
 }
 
+/// Values that are one but for rounding are one: a scale of colours would show the rounding as a pattern.
+VectorXd without_rounding(const VectorXd& values) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double v : values)
+    if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+  if (!(high - low < 1e-9 * std::max(std::fabs(low), std::fabs(high)))) return values;
+  return values.unaryExpr([low](double v) { return std::isfinite(v) ? low : v; });
+}
+
 Image draw_map(const ReportData& data, const VectorXd& per_column, const std::string& label,
                bool with_strengths) {
   const SceneModel& model = *data.model;
   const SkinMesh& mesh = model.model().mesh;
   const SubdividedSurface surface(mesh, SurfaceSide::inner, picture_subdivision(mesh));
   PictureField field;
-  field.values = surface.interpolate(per_column);
+  field.values = without_rounding(surface.interpolate(per_column));
   field.label = label;
   PictureOptions options;
   options.samples = 2;
