@@ -2,7 +2,7 @@
 //
 //   lane_log1p      ln(1 + x)        1.7 ulp     2^k m = 1 + x, m in [√½, √2); the rounding of 1 + x corrected
 //   lane_expm1      e^x − 1          2 ulp       x = k ln 2 + r
-//   lane_sinhc      sinh(x)/x        4 ulp       series, or by lane_expm1 beyond 1
+//   lane_sinhc      sinh(x)/x        3 ulp       series, or by lane_expm1 beyond 1
 //   log_quotients   ln a − ln b and (ln a − ln b)/(a − b), a − b known to better than it could be formed; 5 ulp
 //
 // All are smooth through 0 and a = b: numbers near the rest state keep all their digits. NaN stays NaN.

@@ -24,6 +24,7 @@
 #include "sim/terms/element_sums.h"
 #include "sim/terms/kinematics.h"
 #include "sim/terms/packed_adjoint.h"
+#include "sim/terms/packed_history.h"
 #include "sim/terms/packed_kernel.h"
 #include "sim/terms/packed_tangent.h"
 #include "sim/terms/reverse_kernel.h"
@@ -45,9 +46,20 @@ struct PointKernel : DualKernel<Law, Kin> {
   /// And the derivatives of a step: so do tangent and adjoint blocks.
   static constexpr bool has_step_derivatives = requires { Law::num_tangent_constants; };
 
+  /// And its history advances in packs.
+  static constexpr bool has_packed_history = requires { Law::num_history_constants; };
+
   /// prepared[nq][np] from the old state.
   static void prepare(const Law& law, const ElementView& v, const double* u_old, const double* s_old,
                       double* prepared) {
+    if constexpr (has_packed_history && np > 0)
+      PackedHistory<Law, Kin>::prepare(law, v, u_old, s_old, prepared);
+    else
+      prepare_by_points(law, v, u_old, s_old, prepared);
+  }
+  /// The same without packs.
+  static void prepare_by_points(const Law& law, const ElementView& v, const double* u_old,
+                                const double* s_old, double* prepared) {
     if constexpr (np > 0) {
       double natural[3][max_rows], z[nz], e[ne];
       gather<R>(v, u_old, natural);
@@ -156,6 +168,14 @@ struct PointKernel : DualKernel<Law, Kin> {
   /// New history [nq][ns].
   static void update(const Law& law, const ElementView& v, const double* u, const double* prepared,
                      double* s_new) {
+    if constexpr (has_packed_history && ns > 0)
+      PackedHistory<Law, Kin>::update(law, v, u, prepared, s_new);
+    else
+      update_by_points(law, v, u, prepared, s_new);
+  }
+  /// The same without packs.
+  static void update_by_points(const Law& law, const ElementView& v, const double* u, const double* prepared,
+                               double* s_new) {
     if constexpr (ns > 0) {
       double natural[3][max_rows], z[nz], e[ne];
       gather<R>(v, u, natural);

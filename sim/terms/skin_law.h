@@ -181,6 +181,21 @@ struct SkinLaw {
     return equilibrium_energy +
            maxwell_response(of_x, m, V(constants[0] * theta[SkinTheta::mu_m]), sigma, tangent);
   }
+  /// prepare() and update() in closed form (packed_history.h); the constants are the damper's pre and post.
+  static constexpr int num_history_constants = 2;
+  void history_constants(const double* theta, double dt, double* c) const {
+    const Damper<double> d = damper(scheme, theta[SkinTheta::tau], dt);
+    c[0] = d.pre;
+    c[1] = d.post;
+  }
+  template <class V>
+  void prepare_history(const V* y_old, const V* history, const V* constants, V* prepared) const {
+    isochoric_mean(history, y_old, constants[0], prepared);
+  }
+  template <class V>
+  void update_history(const V* y, const V* prepared, const V* constants, V* history) const {
+    isochoric_mean(prepared, y, constants[1], history);
+  }
   /// Derivatives of a step in closed form (packed_tangent.h); the constants are DamperSlopes.
   static constexpr int num_tangent_constants = DamperSlopes::count;
   void tangent_constants(const double* theta, double dt, double* c) const {

@@ -118,7 +118,7 @@ TEST(LaneFunctions, Sinhc) {
                  large = worst_ulps(f.sinhc, exact, spread(rng, 1, 700, true));
     std::printf("%s: sinhc to %.2f ulp (tiny), %.2f (usual), %.2f (around 1), %.2f (large)\n", f.isa, tiny,
                 usual, around, large);
-    EXPECT_LE(std::max({tiny, usual, around, large}), 4);
+    EXPECT_LE(std::max({tiny, usual, around, large}), 3);
     const Numbers edges = {0, -0.0, std::nan(""), 1, -1, 1, 1, 1};
     Numbers out(8);
     f.sinhc(edges.data(), out.data(), 8);

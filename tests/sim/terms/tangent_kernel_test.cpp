@@ -27,6 +27,20 @@ KernelTable dual_table() {
   return table;
 }
 
+/// The law's kernels whose history advances point by point.
+template <class Law>
+KernelTable table_by_points() {
+  using K = PointKernel<Law, PrismKinematics>;
+  KernelTable table = kernel_table<Law, PrismKinematics>();
+  table.prepare = [](const void* l, const ElementView& v, const double* uo, const double* so, double* p) {
+    K::prepare_by_points(*static_cast<const Law*>(l), v, uo, so, p);
+  };
+  table.update = [](const void* l, const ElementView& v, const double* u, const double* p, double* s) {
+    K::update_by_points(*static_cast<const Law*>(l), v, u, p, s);
+  };
+  return table;
+}
+
 /// Which directions are given, and which results are asked for.
 struct Asked {
   bool du = true, du_old = true, ds_old = true, native = true, df = true, ds_new = true;
@@ -199,6 +213,37 @@ TEST(TangentKernel, AgreesWhereParametersDifferFromPointToPoint) {
     for (const DamperScheme scheme : kSchemes)
       expect_same(with_field(tables.skin, scheme), with_field(dual, scheme), worst);
   std::printf("parameters by point: %.1e\n", worst);
+}
+
+/// History before and after a step, in packs and point by point, down to strains that are all but rounding.
+TEST(PackedHistory, AgreesWithPointByPoint) {
+  const KernelTable by_points = table_by_points<SkinLaw>();
+  double worst = 0;
+  for (const PrismTables& tables : instruction_sets())
+    for (const DamperScheme scheme : kSchemes)
+      for (const double amount : {1.0, 1e-4, 1e-8, 0.0}) {
+        SCOPED_TRACE(testing::Message() << tables.isa << ", strains times " << amount);
+        VectorXd before[2], after[2];
+        for (const bool packed : {false, true}) {
+          TermCase c = skin_case(packed ? tables.skin : by_points, true, scheme, 2, 2, 0.3);
+          c.u_old *= amount;
+          c.u *= amount;
+          c.history *= amount;
+          TermStepData data;
+          c.term().prepare(c.step, c.native, c.u_old, c.history.data(), data);
+          before[packed] = Eigen::Map<VectorXd>(data.prepared.data(), c.history.size());
+          after[packed].resize(c.history.size());
+          c.term().update(c.step, data, c.u, after[packed].data());
+        }
+        for (const VectorXd* h : {before, after}) {
+          EXPECT_LE((h[1] - h[0]).norm(), 1e-14 * h[0].norm());
+          if (amount > 0) worst = std::max(worst, (h[1] - h[0]).norm() / h[0].norm());
+        }
+        if (scheme == DamperScheme::exponential && amount > 0) {
+          EXPECT_GT((after[1] - before[1]).norm(), 1e-3 * before[1].norm());
+        }
+      }
+  std::printf("histories differ by %.1e at most\n", worst);
 }
 
 }  // namespace
