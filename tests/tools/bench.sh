@@ -32,7 +32,7 @@ column "$folder/stages/stages.csv" time_ms | awk '!($1 > 0) { bad = 1 } END { ex
 # A profile: a step has factors, the last of them the certificate, but fewer than iterations, since some keep the factor;
 # factors and skin have a distance to their limits. With factors in single precision the certificate alone is double.
 expect 0 stages "${small[@]}" --seconds 0 --set /solver/factor_precision=mixed -o "$folder/mixed"
-calls() { grep -E "^(scene|patch_600,[^\"]*,\"?$2\"?,)" "$folder/$1/stages.csv" >"$folder/row" && column "$folder/row" calls_per_step; }
+calls() { grep -E "^scene|,$2,|,\"$2\"," "$folder/$1/stages.csv" >"$folder/row" && column "$folder/row" calls_per_step; }
 awk -v f="$(calls stages factorisation)" -v s="$(calls stages factorisation.*single)" -v i="$(calls stages 'feasible step')" \
   'BEGIN { exit !(s == 0 && f >= 2 && f < i) }' || fail "calls in a step"
 awk -v f="$(calls mixed factorisation)" -v s="$(calls mixed factorisation.*single)" -v i="$(calls mixed 'feasible step')" \
