@@ -60,8 +60,11 @@ TEST(ReverseKernel, AgreesWithDualNumbersForEveryDamper) {
   const KernelTable dual = dual_table<SkinLaw>();
   for (const DamperScheme scheme : {DamperScheme::exponential, DamperScheme::literal, DamperScheme::strang,
                                     DamperScheme::backward_euler, DamperScheme::none})
-    for (const int order : {1, 2, 3})
-      expect_same(skin_case(skin_kernels(), true, scheme, order, 2), skin_case(dual, true, scheme, order, 2));
+    for (const int order : {1, 2, 3, 4}) {
+      const double size = order < 4 ? 0.2 : 0.03;  // random ones of high order turn points nearly inside out
+      expect_same(skin_case(skin_kernels(), true, scheme, order, 2, size),
+                  skin_case(dual, true, scheme, order, 2, size));
+    }
 }
 
 TEST(ReverseKernel, AgreesWithDualNumbersForEveryLaw) {

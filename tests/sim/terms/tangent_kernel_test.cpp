@@ -107,9 +107,11 @@ TEST(TangentKernel, AgreesWithDualNumbersForEveryDamperAndInstructionSet) {
     SCOPED_TRACE(tables.isa);
     double worst = 0;
     for (const DamperScheme scheme : kSchemes)
-      for (const int order : {1, 2, 3})
-        expect_same(skin_case(tables.skin, true, scheme, order, 2), skin_case(dual, true, scheme, order, 2),
-                    worst);
+      for (const int order : {1, 2, 3, 4}) {
+        const double size = order < 4 ? 0.2 : 0.03;  // random ones of high order turn points nearly inside out
+        expect_same(skin_case(tables.skin, true, scheme, order, 2, size),
+                    skin_case(dual, true, scheme, order, 2, size), worst);
+      }
     for (const int order : {1, 2, 3, 4})
       expect_same(skin_case(tables.elastic, false, DamperScheme::none, order, 5 - order, 0.03),
                   skin_case(dual_elastic, false, DamperScheme::none, order, 5 - order, 0.03), worst);
