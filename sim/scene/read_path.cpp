@@ -18,8 +18,14 @@ constexpr std::array<const char*, 8> kColumns{"time", "x", "y", "z", "qw", "qx",
 
 /// Columns of deviations, which a fit reads (fitting/path_deviations.h) and a simulation does not need.
 bool is_deviation(const std::string& cell) {
-  for (const char* prefix : {"sigma_", "own_", "shared_"})
-    if (cell.starts_with(prefix)) return true;
+  const auto has_name = [&cell](const std::string& name) {
+    return cell == name || cell == name + "_mm" || cell == name + "_mm2";
+  };
+  for (const char* axis : {"x", "y", "z"})
+    if (has_name(std::string("sigma_") + axis)) return true;
+  for (const char* prefix : {"own_", "shared_"})
+    for (const char* axes : {"xx", "xy", "xz", "yy", "yz", "zz"})
+      if (has_name(std::string(prefix) + axes)) return true;
   return false;
 }
 

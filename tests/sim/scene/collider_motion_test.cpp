@@ -139,6 +139,9 @@ TEST_F(PathFile, HoldsTimesPlacesAndOrientations) {
 TEST_F(PathFile, IsRefusedByLine) {
   EXPECT_THAT(refusal(with("time,x,y\n0,1,2\n")), HasSubstr(":1"));
   EXPECT_THAT(refusal(with("time,x,y,w\n0,1,2,3\n")), HasSubstr("column"));
+  EXPECT_NO_THROW(scene_with(with("time,x,y,z,sigma_x_mm,shared_xz,own_zz_mm2\n0,1,2,3,1,0,1\n")));
+  for (const char* unknown : {"sigma_t", "own_x", "shared_zx", "own_"})
+    EXPECT_THAT(refusal(with("time,x,y,z," + std::string(unknown) + "\n0,1,2,3,1\n")), HasSubstr("column"));
   EXPECT_THAT(refusal(with("time,x,y,z\n0,1,2,3\n0,1,2,3\n")), HasSubstr(":3"));
   EXPECT_THAT(refusal(with("time,x,y,z\n0,1,2\n")), HasSubstr("3 cells"));
   EXPECT_THAT(refusal(with("time,x,y,z\n0,1,2,nan\n")), HasSubstr("finite"));
