@@ -118,13 +118,15 @@ constexpr double kIntact = 0.95;
 
 }  // namespace
 
-bool strays(const Follower& f, const Alignment& a, const std::vector<std::pair<Vec2, Vec2>>& others) {
+bool strays(const Follower& f, const Alignment& a, const std::vector<std::pair<Vec2, Vec2>>& others,
+            std::size_t itself) {
   constexpr std::size_t kNeighbours = 8, kFewest = 4;
-  if (a.correlation >= kIntact || others.size() < kFewest) return false;
-  const std::size_t count = std::min(kNeighbours, others.size());
+  if (a.correlation >= kIntact) return false;
   std::vector<std::pair<double, std::size_t>> near;
   for (std::size_t i = 0; i < others.size(); ++i)
-    near.emplace_back((others[i].first - f.warp.centre).squaredNorm(), i);
+    if (i != itself) near.emplace_back((others[i].first - f.warp.centre).squaredNorm(), i);
+  if (near.size() < kFewest) return false;
+  const std::size_t count = std::min(kNeighbours, near.size());
   std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end());
   const auto median = [count](std::array<double, kNeighbours> values) {
     std::nth_element(values.begin(), values.begin() + count / 2, values.begin() + count);

@@ -74,9 +74,9 @@ bool residual_jumped(const Follower& follower, const Alignment& alignment, doubl
 
 /// Did the window move, since the last frame, unlike the eight nearest of `others` (places there, and motions), by more than
 /// 2 px and five times what these differ among themselves? Not asked where it matches its template well, nor of fewer than
-/// four others.
+/// four others. `itself` is where the window is in the list, past its end where it is not.
 bool strays(const Follower& follower, const Alignment& alignment,
-            const std::vector<std::pair<Vec2, Vec2>>& others);
+            const std::vector<std::pair<Vec2, Vec2>>& others, std::size_t itself);
 
 /// Second attempt (incremental reference update): the skin may have deformed too much since the template was
 /// taken, but much less since the previous frame; so aligns a template cut there. Keeps `first` when this

@@ -191,7 +191,7 @@ class Run {
     }
     for (std::size_t k = 0; k < accepted.size(); ++k) {
       Measurement& m = (*measured)[accepted[k]];
-      if (strays(followers_[accepted[k]], m.alignment, motions)) m.refusal = Refusal::neighbours;
+      if (strays(followers_[accepted[k]], m.alignment, motions, k)) m.refusal = Refusal::neighbours;
     }
   }
 

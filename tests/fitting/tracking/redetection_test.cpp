@@ -91,7 +91,7 @@ TEST(Strays, OnlyWhatFitsBadlyAndMovesUnlikeItsNeighbours) {
   const auto is_stray = [&](double correlation, const Vec2& motion) {
     a.correlation = correlation;
     a.warp.centre = f.warp.centre + motion;
-    return strays(f, a, others);
+    return strays(f, a, others, others.size());
   };
   EXPECT_TRUE(is_stray(0.8, Vec2(20, 0)));
   EXPECT_FALSE(is_stray(0.8, Vec2(2, 1)));
@@ -101,6 +101,11 @@ TEST(Strays, OnlyWhatFitsBadlyAndMovesUnlikeItsNeighbours) {
   EXPECT_FALSE(is_stray(0.8, Vec2(20, 0)));
   others.resize(3);
   EXPECT_FALSE(is_stray(0.8, Vec2(80, 0)));
+  // It is no neighbour of its own: with itself in the list there are three others still.
+  others.emplace_back(f.warp.centre, Vec2(80, 0));
+  a.correlation = 0.8, a.warp.centre = f.warp.centre + Vec2(80, 0);
+  EXPECT_FALSE(strays(f, a, others, 3));
+  EXPECT_TRUE(strays(f, a, others, 4));
 }
 
 }  // namespace
