@@ -56,6 +56,7 @@ class HaltonCoordinate {
 
 /// u_k: what a unit of the spread is.
 double unit_of(const FitVariable& v) {
+  if (!v.moves.empty() && v.prior_sigma) return *v.prior_sigma;  // of its wide bounds a quarter is far off
   return v.transform == ParameterTransform::none ? 0.25 * (v.upper - v.lower) : 1;
 }
 

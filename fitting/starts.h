@@ -2,7 +2,8 @@
 // about the case's own start show whether there are others, and whether the footage tells them apart.
 //
 //   box     |t_k − t_k,initial| <= spread · u_k within the bounds;  u_k = 1 (log, logit) or a quarter of the
-//           range (none)
+//           range (none),
+//           the prior's deviation for what moves several of the scene's parameters (path_deviations.h)
 //   points  start 0 is the case's own, start i the i-th point of a Halton sequence with permuted digits and a
 //           random shift, so that more starts keep those of before
 //

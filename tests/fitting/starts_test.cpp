@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -53,6 +54,17 @@ TEST(StartPoints, FillTheBoxEvenlyAndKeepTheirPrefix) {
   for (std::size_t i = 0; i < fewer.size(); ++i) EXPECT_EQ(fewer[i], points[i]);
   EXPECT_NE(start_points(objective, {.starts = 5, .spread = 0.5, .seed = 4})[1], points[1]);
   EXPECT_THROW(start_points(objective, {.starts = 0}), ContractError);
+}
+
+TEST(StartPoints, OffsetsOfAPathStayWithinTheirPrior) {
+  HandMadeObjective objective = test::two_valleys(0.3);
+  objective.list[0].moves = {{"/colliders/finger/path/0/position/0", 0.1}};
+  objective.list[0].prior_sigma = 0.2;
+  double most = 0;
+  for (const VectorXd& t : start_points(objective, {.starts = 32, .spread = 1}))
+    most = std::max(most, std::fabs(t[0] - objective.initial()[0]));
+  EXPECT_LE(most, 0.2 + 1e-12);
+  EXPECT_GT(most, 0.1);
 }
 
 TEST(StartPoints, ManyParametersAreNotTiedToEachOther) {
