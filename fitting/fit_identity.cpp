@@ -75,13 +75,20 @@ std::string parameters_digest(const FitCase& fit, const Parametrisation& paramet
   for (const double x : {fit.robust_scale, fit.min_sigma, static_cast<double>(fit.first_frame),
                          static_cast<double>(fit.last_frame), fit.rim_margin})
     d.number(x);
-  for (const FrameWeight& rule : fit.frame_weights)  // none: the log of before there were any
+  // Each says what it is: numbers alone could be those of another. None: the log of before there were any.
+  if (!fit.frame_weights.empty()) d.text("frame_weights");
+  for (const FrameWeight& rule : fit.frame_weights)
     for (const double x :
          {static_cast<double>(rule.from), static_cast<double>(rule.to), rule.weight, rule.half_every})
       d.number(x);
-  if (fit.waves)
+  if (fit.waves) {
+    d.text("waves");
     for (const double x : {fit.waves->shortest, fit.waves->longest, fit.waves->tolerance}) d.number(x);
-  if (fit.clip_weight != 1) d.number(fit.clip_weight);
+  }
+  if (fit.clip_weight != 1) {
+    d.text("clip_weight");
+    d.number(fit.clip_weight);
+  }
   for (const StillRegion& region : fit.still) {
     d.matrix(region.low);
     d.matrix(region.high);

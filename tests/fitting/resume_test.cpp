@@ -193,6 +193,17 @@ TEST_F(Resume, AChangedMeshFileIsAnotherScene) {
     EXPECT_EQ(after[k] == before[k], after[k].first != "scene") << after[k].first;
 }
 
+TEST_F(Resume, SameNumbersOfOtherSettingsAreAnotherFit) {
+  const FitProblem problem(input_.scene, input_.options, input_.camera, input_.tracks);
+  FitClip clip{{}, {}, input_.scene, {input_.camera}, input_.tracks};
+  FitCase frames = input_.options, waves = input_.options;
+  frames.frame_weights = {{1, 8, 0.05, 0.5}};
+  waves.waves = WaveBand{1, 8, 0.05};
+  const FitIdentity of_frames = fit_identity(clip, frames, problem);
+  clip.weight = 0.5;
+  EXPECT_NE(of_frames, fit_identity(clip, waves, problem));
+}
+
 TEST_F(Resume, PointWithoutDerivativeIsARefusedStep) {
   const Outcome whole = fit("log");
   // Pretend that the second accepted point could be run but not differentiated.
