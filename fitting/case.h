@@ -46,6 +46,7 @@ struct FitParameter {
   std::vector<std::pair<std::string, double>> moves = {};
   std::string name = {};   ///< for reports; of the scene's own parameters the scene says it
   std::string group = {};  ///< parameters of one name here are considered as one, by the sum of what they do
+  bool is_held = false;    ///< only differentiated by (consider.h): observations need not outnumber these
 };
 
 struct RenderCase {
@@ -79,12 +80,16 @@ struct StageCase {
   std::string words() const;      ///< what it does otherwise, for messages
 };
 
+/// Weights below this count as none: what they would leave of an observation is lost in rounding.
+inline constexpr double kLeastWeight = 1e-9;
+
 /// What observations of some frames weigh; of several that hold a frame the last counts.
 struct FrameWeight {
   int from = 1, to = 0;   ///< frames, both included; to 0: all from there on
   double weight = 1;      ///< in [0, 1]; 0: they are not compared
   double half_every = 0;  ///< frames after which it has fallen to the half, again and again; 0: it does not
 };
+/// 1 where no rule holds the frame, 0 below kLeastWeight.
 double frame_weight(const std::vector<FrameWeight>& rules, int frame);
 
 struct FitCase {

@@ -138,9 +138,9 @@ std::vector<Rule> fit_rules() {
        .type = RuleType::object,
        .doc = "Compare also how strong the waves of these lengths are in what the tracks have moved, by wave "
               "vector and "
-              "whatever their phase: wrinkles that are not yet where the fit has them. They lead the fit, "
-              "intervals are "
-              "those of the points."},
+              "whatever their phase: wrinkles that are not yet where the fit has them. They lead the "
+              "search, which "
+              "ends on the points alone: answer and intervals are those of the points."},
       {.pointer = "/fit/waves/shortest",
        .dimension = dimension::length,
        .is_required = true,

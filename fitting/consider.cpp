@@ -101,19 +101,38 @@ std::vector<FitParameter> considered_parameters(const JointFitInput& input) {
   return list;
 }
 
-std::vector<SystematicShift> considered_shifts(const JointFitInput& input, JointProblem& problem,
-                                               const VectorXd& t, const FitProblem::Linearised& linearised,
-                                               const MatrixXd& basis, const FitObserver& observer) {
-  const std::vector<FitParameter> held = considered_parameters(input);
-  if (held.empty() || (observer.should_stop && observer.should_stop())) return {};
-  if (observer.note) observer.note("held parameters: by how much they would move the answer");
+namespace {
+
+/// What became of held parameters that were looked at in one run.
+struct Considered {
+  std::vector<SystematicShift> shifts;
+  bool failed = false, was_stopped = false;  ///< all of them
+};
+
+/// Shifts without a size, one per group and one for each other parameter.
+std::vector<SystematicShift> refused(const std::vector<FitParameter>& held, const std::string& why) {
+  std::vector<SystematicShift> shifts;
+  for (std::size_t h = 0; h < held.size(); ++h) {
+    const std::string& group = held[h].group;
+    if (!group.empty() && h > 0 && held[h - 1].group == group) continue;
+    SystematicShift& shift = shifts.emplace_back();
+    shift.name = "held " + (group.empty() ? joint_address(held[h]) : group);
+    shift.change = group.empty() ? "held parameter" : group;
+    shift.failure = why;
+  }
+  return shifts;
+}
+
+/// The input with these parameters behind its own, at the values that they have at t.
+JointFitInput with_held(const JointFitInput& input, const std::vector<FitParameter>& held,
+                        const JointProblem& problem, const VectorXd& t) {
   JointFitInput wide = input;
   for (FitParameter p : held) {
     p.prior_sigma.reset();
-    for (int c = 0; c < problem.num_clips(); ++c) {
+    p.is_held = true;
+    for (int c = 0; c < problem.num_clips() && p.moves.empty(); ++c) {
       // As it was in the fit's run: penalties follow the gauge modulus when that is fitted.
       const Scene scene = problem.clip(c).parametrisation().scene(problem.of_clip(c, t));
-      if (!p.moves.empty()) break;
       const std::vector<ParameterSpec> known = all_parameters(scene);
       const bool has_it = std::any_of(known.begin(), known.end(),
                                       [&](const ParameterSpec& spec) { return spec.address == p.address; });
@@ -123,10 +142,19 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, Joint
     }
     wide.options.parameters.push_back(std::move(p));
   }
-  release_paths(wide);
-  if (!wide.evaluations.empty()) wide.evaluations += "/considered";
+  return wide;
+}
+
+Considered consider(const JointFitInput& input, const std::vector<FitParameter>& held, JointProblem& problem,
+                    const VectorXd& t, const FitProblem::Linearised& linearised, const MatrixXd& basis,
+                    const FitObserver& observer, const std::string& folder) {
+  JointFitInput wide = with_held(input, held, problem, t);
+  if (std::any_of(held.begin(), held.end(), [](const FitParameter& p) { return !p.moves.empty(); }))
+    release_paths(wide);
+  if (!wide.evaluations.empty()) wide.evaluations += folder;
   const auto start = std::chrono::steady_clock::now();
-  std::vector<SystematicShift> shifts;
+  Considered out;
+  std::vector<SystematicShift>& shifts = out.shifts;
   const Eigen::Index n = problem.num_parameters();
   try {
     JointProblem considered(wide.clips, wide.options);
@@ -135,10 +163,12 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, Joint
     VectorXd all = considered.initial();
     all.head(n) = t;
     const auto at = considered.linearised(all);
-    if (considered.was_stopped()) return {};
+    out.was_stopped = considered.was_stopped();
+    if (out.was_stopped) return out;
     const VectorXd &there = considered.evaluate(all).residuals, &here = problem.evaluate(t).residuals;
     const bool is_same_run =
         at && there.size() == here.size() && (there - here).norm() <= 1e-6 * (1 + here.norm());
+    out.failed = !is_same_run;
     for (std::size_t h = 0; h < held.size(); ++h) {
       const Eigen::Index column = n + static_cast<Eigen::Index>(h);
       const FitVariable& v = considered.variables()[static_cast<std::size_t>(column)];
@@ -169,12 +199,34 @@ std::vector<SystematicShift> considered_shifts(const JointFitInput& input, Joint
     }
     for (SystematicShift& found : shifts) sum_up(found);
   } catch (const InputError& error) {
-    SystematicShift& found = shifts.emplace_back();
-    found.name = "held", found.change = "held parameters", found.failure = error.what();
+    shifts = refused(held, error.what());
+    out.failed = true;
   }
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (SystematicShift& shift : shifts) shift.seconds = seconds / static_cast<double>(shifts.size());
-  return shifts;
+  return out;
+}
+
+}  // namespace
+
+std::vector<SystematicShift> considered_shifts(const JointFitInput& input, JointProblem& problem,
+                                               const VectorXd& t, const FitProblem::Linearised& linearised,
+                                               const MatrixXd& basis, const FitObserver& observer) {
+  const std::vector<FitParameter> held = considered_parameters(input);
+  if (held.empty() || (observer.should_stop && observer.should_stop())) return {};
+  if (observer.note) observer.note("held parameters: by how much they would move the answer");
+  Considered found = consider(input, held, problem, t, linearised, basis, observer, "/considered");
+  std::vector<FitParameter> paths, others;
+  for (const FitParameter& p : held) (p.moves.empty() ? others : paths).push_back(p);
+  if (found.was_stopped || !found.failed || paths.empty() || others.empty()) return found.shifts;
+  // One kind must not take the other's shifts away.
+  found = consider(input, paths, problem, t, linearised, basis, observer, "/considered_paths");
+  if (found.was_stopped) return {};
+  const Considered second =
+      consider(input, others, problem, t, linearised, basis, observer, "/considered_others");
+  if (second.was_stopped) return {};
+  found.shifts.insert(found.shifts.end(), second.shifts.begin(), second.shifts.end());
+  return found.shifts;
 }
 
 }  // namespace rhytid::fitting

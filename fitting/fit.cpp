@@ -14,6 +14,7 @@
 #include "fitting/profile.h"
 #include "fitting/stages.h"
 #include "fitting/starts.h"
+#include "fitting/wave_lead.h"
 #include "sim/core/error.h"
 
 namespace rhytid::fitting {
@@ -51,9 +52,10 @@ LocalFit local_search(const FitCase& fit, OptimiserOptions options, const FitObs
   };
 }
 
-/// Where the best point was found: its fit, with intervals where there is a derivative.
-void describe_best(const JointFitInput& input, JointProblem& problem, const StartsOutcome& starts,
-                   bool have_point, const FitObserver& observer, FitResult& result) {
+/// Where the best point was found: its fit, with intervals where there is a derivative. `lead` may be null.
+void describe_best(const JointFitInput& input, JointProblem& problem, WaveLead* lead,
+                   const StartsOutcome& starts, bool have_point, const FitObserver& observer,
+                   FitResult& result) {
   const VectorXd& t = starts.best().t.size() > 0 ? starts.best().t : starts.starts[0].t;
   const auto linearised = have_point ? problem.linearised(t) : std::nullopt;
   const bool is_there = have_point && !problem.evaluate(t).failed;  // else stopped while it was run again
@@ -66,6 +68,7 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Star
   if (is_there) {
     result.final_cost = problem.evaluate(t).cost;
     add_residuals(input, problem, t, result);
+    if (lead != nullptr) add_waves(lead->problem(), problem, t, result);
     for (int c = 0; c < problem.num_clips(); ++c)
       result.fitted_scenes.push_back(problem.clip(c).parametrisation().scene(problem.of_clip(c, t)));
     result.fitted_scene = result.fitted_scenes.front();
@@ -96,12 +99,14 @@ void describe_best(const JointFitInput& input, JointProblem& problem, const Star
     if (held.empty()) stop_here();
     result.systematic.insert(result.systematic.end(), held.begin(), held.end());
   }
+  add_path_notes(input, result);
   for (const SystematicShift& shift : result.systematic) {
     if (!shift.failure.empty()) continue;
     if (shift.axes.empty()) found.add_systematic(shift.shift);
     for (const std::vector<double>& axis : shift.axes) found.add_systematic(axis);
   }
   add_parameters(problem, t, &found, truth, result);
+  if (lead != nullptr) lead->add_note(t, found, result);
   add_modulus_ratios(problem, found, t, truth, result);
   add_clip_chi_squares(problem, *linearised, found, result);
   add_systematic_notes(input.options, result);
@@ -156,7 +161,9 @@ FitResult run_fit(const FitInput& input, const FitObserver& observer) {
 
 FitResult run_fit(const JointFitInput& given, const FitObserver& observer) {
   const auto start = std::chrono::steady_clock::now();
-  const JointFitInput input = with_path_errors(given);
+  const JointFitInput led = with_path_errors(given);
+  JointFitInput input = led;  // what is answered is by the points
+  input.options.waves.reset();
   JointProblem problem(input.clips, input.options);
   problem.on_run = observer.run;
   problem.stop_when(observer.should_stop);
@@ -168,16 +175,20 @@ FitResult run_fit(const JointFitInput& given, const FitObserver& observer) {
   if (input.options.optimiser != "ceres" && input.options.optimiser != "nlopt")
     throw InputError("fit: optimiser", "'" + input.options.optimiser + "'", "ceres or nlopt");
   profiled_variables(problem, input.options.profiles);  // throws before anything is run
-  const LocalFit local_fit = local_search(input.options, {}, observer);
+  std::optional<WaveLead> lead;
+  if (led.options.waves) lead.emplace(led, observer);
+  LocalFit local_fit = local_search(input.options, {}, observer);
+  if (lead) local_fit = lead->both_ways(problem, local_fit);
   StagesOutcome stages = run_stages(
-      input, problem,
+      led, problem,
       [&](Search& search, int most) {
         return minimise(input.options, search, {.max_evaluations = most, .relative_decrease = kStageDecrease},
                         {});
       },
       observer);
-  const StartsOutcome starts =
-      fit_from_starts(input, problem, better_start(problem, stages), local_fit, observer);
+  StartsOutcome starts = fit_from_starts(led, problem, better_start(lead ? lead->problem() : problem, stages),
+                                         local_fit, observer);
+  if (lead) lead->add_runs(starts);
   const OptimiserOutcome& outcome = starts.best();
 
   FitResult result;
@@ -188,13 +199,16 @@ FitResult run_fit(const JointFitInput& given, const FitObserver& observer) {
   result.stopped = outcome.status == OptimiserOutcome::Status::stopped;
   result.history = outcome.history;
   result.stages = stages.stages;
+  if (lead) lead->add_stage(outcome.t, result);
   result.gauge = problem.gauge_sentence();
   if (!result.history.empty()) result.initial_cost = result.history.front().cost;
   const bool has_best = outcome.t.size() > 0 && std::isfinite(outcome.cost);
   if (has_best) result.final_cost = outcome.cost;
-  describe_best(input, problem, starts, has_best && !result.stopped, observer, result);
+  describe_best(input, problem, lead ? &*lead : nullptr, starts, has_best && !result.stopped, observer,
+                result);
   add_counts(problem, result);
   result.forward_runs += starts.screening_runs;
+  if (lead) result.forward_runs += lead->problem().forward_runs();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }

@@ -81,7 +81,7 @@ std::string clip_table(const FitResult& result) {
 /// A line per quantity that was measured besides pixels.
 std::string measured_lines(const FitResult& result) {
   struct Sum {
-    int count = 0;
+    int count = 0, known = 0;  ///< of the latter a deviation is known
     double squares = 0, whitened = 0;
   };
   std::map<std::string, Sum> sums;
@@ -89,13 +89,13 @@ std::string measured_lines(const FitResult& result) {
     Sum& sum = sums[m.quantity];
     ++sum.count;
     sum.squares += (m.value - m.predicted) * (m.value - m.predicted);
-    if (m.sigma > 0) sum.whitened += std::pow((m.value - m.predicted) / m.sigma, 2);
+    if (m.sigma > 0) ++sum.known, sum.whitened += std::pow((m.value - m.predicted) / m.sigma, 2);
   }
   std::string text;
   for (const auto& [quantity, sum] : sums)
     text += quantity + ": " + std::to_string(sum.count) + " values, off by " +
             number(std::sqrt(sum.squares / sum.count)) + " " + measured_unit(quantity) + " rms, " +
-            number(std::sqrt(sum.whitened / sum.count)) + " of their deviations.\n";
+            number(std::sqrt(sum.whitened / std::max(1, sum.known))) + " of their deviations.\n";
   return text;
 }
 

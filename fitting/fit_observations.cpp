@@ -45,7 +45,7 @@ double frame_weight(const std::vector<FrameWeight>& rules, int frame) {
   for (const FrameWeight& rule : rules)
     if (frame >= rule.from && (rule.to == 0 || frame <= rule.to))
       weight = rule.weight * (rule.half_every > 0 ? std::exp2(-(frame - rule.from) / rule.half_every) : 1);
-  return weight;
+  return weight < kLeastWeight ? 0 : weight;
 }
 
 void FitProblem::attach(const Scene& scene, const FitCase& fit, const Camera& camera, int number,
@@ -90,7 +90,10 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
       if (o.status != TrackStatus::ok || o.frame < first || o.frame > options_.frames) continue;
       if (motion != nullptr && !motion->known[o.frame]) continue;
       const double weight = frame_weight(fit.frame_weights, o.frame);
-      if (weight == 0) continue;
+      if (weight == 0) {
+        ++weighed_away_;
+        continue;
+      }
       weights.push_back(weight);
       compared.frames.push_back(o.frame);
       compared.observed.push_back(o.pixel);
@@ -100,6 +103,7 @@ void FitProblem::choose_observations(const TrackSet& tracks, const FitCase& fit,
     }
     if (compared.frames.empty()) continue;
     num_observations_ += static_cast<int>(compared.frames.size());
+    for (const double weight : weights) sum_of_weights_ += weight * fit.clip_weight;
     noise_.emplace_back(track, used_observations, floor, fit.robust_scale,
                         TrackWeights{std::move(weights), fit.clip_weight});
     compared_.push_back(std::move(compared));
@@ -122,6 +126,11 @@ std::vector<WavePoint> FitProblem::wave_points() const {
 }
 
 void FitProblem::require_observations(const FitCase& fit, const std::vector<Camera>& cameras) const {
+  if (num_observations_ == 0 && weighed_away_ > 0)
+    throw InputError(
+        "fit: /fit/frame_weights",
+        "a weight of 0, or below 1e-9, for all " + std::to_string(weighed_away_) + " usable observations",
+        "a weight in frames that are compared");
   std::string names;
   for (const Camera& camera : cameras) names += (names.empty() ? "'" : ", '") + camera.name + "'";
   for (std::size_t c = 0; c < cameras.size() && cameras.size() > 1; ++c)
@@ -129,7 +138,9 @@ void FitProblem::require_observations(const FitCase& fit, const std::vector<Came
                      [&](const ComparedTrack& t) { return t.camera == static_cast<int>(c); }))
       throw InputError("fit: tracks of camera '" + cameras[c].name + "'", "no usable observation",
                        "tracks that are seen in frame 0 on the skin; or leave the camera out");
-  if (2 * num_observations_ <= num_parameters())
+  const auto fitted = std::count_if(fit.parameters.begin(), fit.parameters.end(),
+                                    [](const FitParameter& p) { return !p.is_held; });
+  if (2 * num_observations_ <= fitted)
     throw InputError("fit: tracks of camera " + names,
                      std::to_string(num_observations_) + " usable observations in frames " +
                          std::to_string(std::max(1, fit.first_frame)) + ".." +
@@ -138,7 +149,7 @@ void FitProblem::require_observations(const FitCase& fit, const std::vector<Came
                          std::to_string(registration_.report.missed_mesh) + " beside the skin, " +
                          std::to_string(registration_.report.back_side) + " on its back, " +
                          std::to_string(registration_.report.near_rim) + " near the rim)",
-                     "more numbers than the " + std::to_string(num_parameters()) + " parameters");
+                     "more numbers than the " + std::to_string(fitted) + " parameters");
 }
 
 }  // namespace rhytid::fitting

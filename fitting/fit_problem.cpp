@@ -105,7 +105,7 @@ void FitProblem::predict_by(const std::vector<Camera>& cameras) {
 }
 
 int FitProblem::degrees_of_freedom() const {
-  int dof = 2 * num_observations_ - num_parameters();
+  int dof = static_cast<int>(std::lround(2 * sum_of_weights_)) - num_parameters();
   if (measured_) dof += static_cast<int>(measured_->values().size());
   for (const FitVariable& v : parametrisation_.variables()) dof += v.prior_sigma ? 1 : 0;
   return dof;

@@ -63,7 +63,9 @@ class FitProblem final : public Objective {
   VectorXd upper() const override { return parametrisation_.upper(); }
   int num_residuals() const override { return num_residuals_; }
   int num_observations() const { return num_observations_; }  ///< pixels compared (two numbers each)
-  int degrees_of_freedom() const;                             ///< independent residuals minus parameters
+  double sum_of_weights() const { return sum_of_weights_; }   ///< of them; as many where none weighs less
+  /// Independent residuals minus parameters; what weighs less counts for as much less.
+  int degrees_of_freedom() const;
   int frames() const { return options_.frames; }
   const Registration& registration() const { return registration_; }
   const SceneModel& scene_model() const { return model_; }
@@ -169,6 +171,8 @@ class FitProblem final : public Objective {
   /// Row of (track, observation) in its frame's output, in the order of compared_.
   std::vector<std::vector<int>> output_row_;
   int num_residuals_ = 0, num_observations_ = 0;
+  double sum_of_weights_ = 0;
+  int weighed_away_ = 0;  ///< observations that frame_weights leave out
 
   std::vector<Eigen::Index> frame_row_;  ///< first row of a frame among the predictions of all
   Eigen::Index num_predicted_ = 0;

@@ -119,37 +119,6 @@ void add_clip(const TrackSet& tracks, const FitProblem& problem, const FitEvalua
   clip.rms_px = std::sqrt(clip.rms_px / std::max(1, clip.num_observations));
 }
 
-/// What waves there are in the tracks of clip c and in the prediction.
-void add_waves(JointProblem& problem, int c, const VectorXd& t, FitResult& result) {
-  FitProblem& clip = problem.clip(c);
-  if (!clip.waves()) return;
-  const std::vector<WaveDescription> tracked = clip.waves()->tracked(),
-                                     predicted = clip.waves()->predicted(
-                                         clip.evaluate(problem.of_clip(c, t)).differences);
-  for (std::size_t i = 0; i < tracked.size(); ++i) {
-    const WaveDescription &a = tracked[i], &b = predicted[i];
-    const std::string camera = clip.cameras().size() > 1 ? "_" + clip.cameras()[a.camera].name : "";
-    constexpr double kDegrees = 57.29577951308232;
-    double turned = std::remainder(b.direction - a.direction, 3.141592653589793);
-    result.measured.push_back(
-        {c, a.frame, "waves_amplitude" + camera, a.amplitude, a.amplitude_sigma, b.amplitude});
-    if (a.amplitude < 3 * a.amplitude_sigma) continue;  // nothing to describe
-    result.measured.push_back(
-        {c, a.frame, "waves_length" + camera, a.wavelength, a.wavelength_sigma, b.wavelength});
-    result.measured.push_back({c, a.frame, "waves_direction" + camera, kDegrees * a.direction,
-                               kDegrees * a.direction_sigma, kDegrees * (a.direction + turned)});
-  }
-  const Eigen::Matrix<double, 3, 2>& plane = clip.waves()->plane();
-  result.notes.push_back((clip.name.empty() ? std::string() : "Clip " + clip.name + ": ") +
-                         "Waves in what tracks have moved were compared besides their points, by wave vector "
-                         "and not by phase; directions are "
-                         "from (" +
-                         number("%.2f, ", plane(0, 0)) + number("%.2f, ", plane(1, 0)) +
-                         number("%.2f", plane(2, 0)) + ") toward (" + number("%.2f, ", plane(0, 1)) +
-                         number("%.2f, ", plane(1, 1)) + number("%.2f", plane(2, 1)) +
-                         "). They lead the fit; the intervals are those of the points.");
-}
-
 }  // namespace
 
 NoiseCheck check_noise(JointProblem& problem, const VectorXd& t, const VectorXd& whitened) {
@@ -296,7 +265,6 @@ void add_residuals(const JointFitInput& input, JointProblem& problem, const Vect
                                  m.value - m.sigma * at.measured[static_cast<Eigen::Index>(i)]});
     }
   }
-  for (int c = 0; c < problem.num_clips(); ++c) add_waves(problem, c, t, result);
   double sum = 0;
   for (int c = 0; c < problem.num_clips(); ++c) {
     FittedClip clip;
@@ -309,6 +277,37 @@ void add_residuals(const JointFitInput& input, JointProblem& problem, const Vect
   result.rms_px = std::sqrt(sum / std::max<std::size_t>(1, result.residuals.size()));
 }
 
+void add_waves(const JointProblem& with_waves, JointProblem& problem, const VectorXd& t, FitResult& result) {
+  for (int c = 0; c < problem.num_clips(); ++c) {
+    const FitProblem& clip = with_waves.clip(c);
+    if (!clip.waves()) continue;
+    const std::vector<WaveDescription> tracked = clip.waves()->tracked(),
+                                       predicted = clip.waves()->predicted(
+                                           problem.clip(c).evaluate(problem.of_clip(c, t)).differences);
+    for (std::size_t i = 0; i < tracked.size(); ++i) {
+      const WaveDescription &a = tracked[i], &b = predicted[i];
+      const std::string camera = clip.cameras().size() > 1 ? "_" + clip.cameras()[a.camera].name : "";
+      constexpr double kDegrees = 57.29577951308232;
+      const double turned = std::remainder(b.direction - a.direction, 3.141592653589793);
+      result.measured.push_back(
+          {c, a.frame, "waves_amplitude" + camera, a.amplitude, a.amplitude_sigma, b.amplitude});
+      if (!(a.amplitude > 3 * a.amplitude_sigma)) continue;  // nothing to describe
+      result.measured.push_back(
+          {c, a.frame, "waves_length" + camera, a.wavelength, a.wavelength_sigma, b.wavelength});
+      result.measured.push_back({c, a.frame, "waves_direction" + camera, kDegrees * a.direction,
+                                 kDegrees * a.direction_sigma, kDegrees * (a.direction + turned)});
+    }
+    const Eigen::Matrix<double, 3, 2>& plane = clip.waves()->plane();
+    result.notes.push_back(
+        (problem.name(c).empty() ? std::string() : "Clip " + problem.name(c) + ": ") +
+        "Waves in what tracks have moved led the search besides their points, by wave vector "
+        "and not by phase; directions are from (" +
+        number("%.2f, ", plane(0, 0)) + number("%.2f, ", plane(1, 0)) + number("%.2f", plane(2, 0)) +
+        ") toward (" + number("%.2f, ", plane(0, 1)) + number("%.2f, ", plane(1, 1)) +
+        number("%.2f", plane(2, 1)) + ").");
+  }
+}
+
 void add_clip_chi_squares(const JointProblem& problem, const FitProblem::Linearised& at,
                           const Identifiability& found, FitResult& result) {
   Eigen::Index row = 0;
@@ -318,7 +317,7 @@ void add_clip_chi_squares(const JointProblem& problem, const FitProblem::Lineari
     Eigen::Index rows = 0;  // of tracks; priors follow them
     for (const TrackNoise& noise : problem_c.noise()) rows += noise.num_rows();
     const double used = (at.jacobian.middleRows(row, rows) * found.basis()).squaredNorm();
-    clip.degrees_of_freedom = std::max(1.0, 2 * clip.num_observations - used);
+    clip.degrees_of_freedom = std::max(1.0, 2 * problem_c.sum_of_weights() - used);
     clip.reduced_chi_square = at.residuals.segment(row, rows).squaredNorm() / clip.degrees_of_freedom;
     row += problem_c.num_residuals();
   }

@@ -39,6 +39,8 @@ void add_modulus_ratios(const JointProblem& problem, const Identifiability& foun
 /// Residuals in px, their rms, and what each of several clips contributed. The problem is asked at t, where
 /// it was last evaluated.
 void add_residuals(const JointFitInput& input, JointProblem& problem, const VectorXd& t, FitResult& result);
+/// What waves there are in the tracks of each clip, which `with_waves` measured, and in what `problem` predicts at t.
+void add_waves(const JointProblem& with_waves, JointProblem& problem, const VectorXd& t, FitResult& result);
 /// The clips' chi-squares, which need the Jacobian.
 void add_clip_chi_squares(const JointProblem& problem, const FitProblem::Linearised& at,
                           const Identifiability& found, FitResult& result);

@@ -185,7 +185,9 @@ int JointProblem::num_observations() const {
 }
 
 int JointProblem::degrees_of_freedom() const {
-  int dof = 2 * num_observations() + num_measured() - num_parameters();
+  double weights = 0;
+  for (const FitProblem& clip : clips_) weights += clip.sum_of_weights();
+  int dof = static_cast<int>(std::lround(2 * weights)) + num_measured() - num_parameters();
   for (const FitVariable& v : variables_) dof += v.prior_sigma ? 1 : 0;
   return dof;
 }

@@ -64,7 +64,7 @@ class JointProblem final : public Objective {
   VectorXd of_clip(int c, const VectorXd& t) const;                     ///< t_c = S_c t
   const std::vector<int>& columns(int c) const { return columns_[c]; }  ///< S_c: variable of each of t_c
   int num_observations() const;
-  int degrees_of_freedom() const;  ///< independent residuals minus parameters
+  int degrees_of_freedom() const;  ///< as FitProblem::degrees_of_freedom
   /// All clips' FitProblem::linearised, one below the other.
   std::optional<FitProblem::Linearised> linearised(const VectorXd& t);
 

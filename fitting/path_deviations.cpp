@@ -116,7 +116,6 @@ class PathModes {
  private:
   void add_shared(const Vec3& axis) {
     FitParameter& p = parameter("offset/" + std::to_string(shared.size()), shared);
-    p.group = group() + ", all alike";
     Eigen::Index along = 0;
     axis.cwiseAbs().maxCoeff(&along);
     p.group = group() + " offset";
@@ -219,8 +218,8 @@ JointFitInput with_path_errors(const JointFitInput& input) {
       const bool fits_here = fits && !modes.shared.empty();
       out.path_notes.push_back(which + size +
                                (fits_here ? "the offset is fitted with that as its prior, what knots err by "
-                                            "themselves is in the intervals."
-                                          : "what that would move is in the intervals."));
+                                            "themselves is considered."
+                                          : "what that would move is considered."));
       auto& of_shared = fits_here ? fitted : out.path_errors;
       of_shared.insert(of_shared.end(), modes.shared.begin(), modes.shared.end());
       out.path_errors.insert(out.path_errors.end(), modes.own.begin(), modes.own.end());
@@ -237,6 +236,26 @@ JointFitInput with_path_errors(const JointFitInput& input) {
     out.options.parameters.push_back(std::move(p));
   }
   return out;
+}
+
+void add_path_notes(const JointFitInput& input, FitResult& result) {
+  std::string in, out;
+  for (std::size_t k = 0; k < input.path_errors.size(); ++k) {
+    const std::string& group = input.path_errors[k].group;
+    if (k > 0 && input.path_errors[k - 1].group == group) continue;
+    const auto found =
+        std::find_if(result.systematic.begin(), result.systematic.end(),
+                     [&](const SystematicShift& shift) { return shift.name == "held " + group; });
+    if (found != result.systematic.end() && found->failure.empty())
+      in += (in.empty() ? "" : ", ") + group;
+    else
+      out += (out.empty() ? "" : "; ") + group +
+             (found == result.systematic.end() ? std::string() : " (" + found->failure + ")");
+  }
+  if (!in.empty())
+    result.notes.push_back("What these may be off would move is in the intervals: " + in + ".");
+  if (!out.empty())
+    result.notes.push_back("Warning: what these may be off would move is not in the intervals: " + out + ".");
 }
 
 void release_paths(JointFitInput& input) {

@@ -37,6 +37,9 @@ std::optional<PathDeviations> read_path_deviations(const std::string& file);
 /// compared, those that are to be fitted among the parameters instead, and `path_notes` about them.
 JointFitInput with_path_errors(const JointFitInput& input);
 
+/// Notes on which of `path_errors` the shifts of the result hold, and so its intervals, and which they do not.
+void add_path_notes(const JointFitInput& input, FitResult& result);
+
 /// Makes the knots of the clips whose paths may be off parameters of their scenes: they are no longer those of a file.
 void release_paths(JointFitInput& input);
 

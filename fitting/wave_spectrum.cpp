@@ -3,7 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 
@@ -32,6 +34,22 @@ VectorXd powers(const MatrixXd& coefficients) {
   return power;
 }
 
+/// Median over the points of the distance to the nearest that the same camera sees; 0 for fewer than two.
+double usual_distance(const std::vector<WavePoint>& points) {
+  std::vector<double> nearest;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t j = 0; j < points.size(); ++j)
+      if (j != i && points[j].camera == points[i].camera)
+        least = std::min(least, (points[j].rest - points[i].rest).squaredNorm());
+    if (std::isfinite(least)) nearest.push_back(std::sqrt(least));
+  }
+  if (nearest.empty()) return 0;
+  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
+  std::nth_element(nearest.begin(), middle, nearest.end());
+  return *middle;
+}
+
 }  // namespace
 
 WaveSpectrum::WaveSpectrum(const std::vector<WavePoint>& points, const WaveBand& band)
@@ -40,6 +58,11 @@ WaveSpectrum::WaveSpectrum(const std::vector<WavePoint>& points, const WaveBand&
     throw InputError("fit: /fit/waves",
                      "from " + std::to_string(band.shortest) + " to " + std::to_string(band.longest) + " mm",
                      "0 < shortest < longest");
+  // Shorter waves alias between the points, and their number grows without bound.
+  if (const double least = 2 * usual_distance(points); band.shortest < least)
+    throw InputError(
+        "fit: /fit/waves/shortest", std::to_string(band.shortest) + " mm",
+        "at least " + std::to_string(least) + " mm, twice the distance of a usual track to its nearest");
   Vec3 mean = Vec3::Zero();
   for (const WavePoint& p : points)
     mean += p.rest / static_cast<double>(std::max<std::size_t>(1, points.size()));

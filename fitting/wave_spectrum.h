@@ -51,7 +51,8 @@ struct WaveDescription {
 class WaveSpectrum {
  public:
   /// Frames that see too few points for a wave beside the quadratic have no residuals. Throws InputError for a band
-  /// without wavelengths, and where no frame tells any.
+  /// without wavelengths or with waves shorter than twice the median distance of a point to its nearest, and where no frame
+  /// tells any.
   WaveSpectrum(const std::vector<WavePoint>& points, const WaveBand& band);
 
   int size() const { return size_; }

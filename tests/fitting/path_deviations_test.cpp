@@ -10,6 +10,7 @@
 #include <fstream>
 #include <random>
 
+#include "fitting/consider.h"
 #include "sim/output/text.h"
 #include "sim/scene/collider_motion.h"
 #include "sim/scene/read_path.h"
@@ -145,7 +146,8 @@ TEST_F(PathDeviationsTest, MakeIntervalsHoldTheTruthThatTheyMissedBefore) {
     const FitResult exact = run_fit(input);
     if (seed == 1) std::printf("%s", answer_text(known).c_str());
     ASSERT_TRUE(known.converged && exact.converged);
-    EXPECT_THAT(known.notes, Contains(HasSubstr("what that would move is in the intervals")));
+    EXPECT_THAT(known.notes,
+                Contains(HasSubstr("is in the intervals: finger path offset, finger path by knot")));
     with += held(known), without += held(exact), all += 2;
     for (const SystematicShift& shift : known.systematic) EXPECT_EQ(shift.failure, "");
     for (std::size_t k = 0; k < 2; ++k) {
@@ -157,6 +159,37 @@ TEST_F(PathDeviationsTest, MakeIntervalsHoldTheTruthThatTheyMissedBefore) {
               without);
   EXPECT_GE(with, all - 1);
   EXPECT_LE(without, all / 2);
+}
+
+// As many observations as it takes to fit are enough to consider any number of knots; what fails takes nothing else along.
+TEST_F(PathDeviationsTest, AreConsideredWhereObservationsAreFewerThanKnots) {
+  FitInput input = make_input(1, "consider");
+  input.options.consider.reset();
+  input.tracks.tracks.resize(2);  // 16 numbers in 4 frames for 2 parameters, and 18 + 1 that are held
+  const FitResult found = run_fit(input);
+  ASSERT_EQ(found.systematic.size(), 3u);
+  for (const SystematicShift& shift : found.systematic) EXPECT_EQ(shift.failure, "") << shift.name;
+}
+
+TEST_F(PathDeviationsTest, ThatCannotBeConsideredLeaveFrictionAlone) {
+  FitInput input = make_input(1, "consider");
+  const JointFitInput given{.clips = {{"", "", input.scene, {input.camera}, input.tracks}},
+                            .options = input.options};
+  JointFitInput known = with_path_errors(given);
+  known.options.consider.reset();
+  known.path_errors[0].moves.front().first = "/colliders/finger/path/99/position/0";
+  JointProblem problem(known.clips, known.options);
+  const VectorXd t = problem.initial();
+  const auto at = problem.linearised(t);
+  ASSERT_TRUE(at);
+  FitResult result;
+  result.systematic = considered_shifts(known, problem, t, *at, MatrixXd::Identity(2, 2), {});
+  ASSERT_EQ(result.systematic.size(), 3u);
+  EXPECT_NE(result.systematic[0].failure, "");
+  EXPECT_THAT(result.systematic[2].name, HasSubstr("friction"));
+  EXPECT_EQ(result.systematic[2].failure, "");
+  add_path_notes(known, result);
+  EXPECT_THAT(result.notes, Contains(HasSubstr("is not in the intervals: finger path offset (")));
 }
 
 TEST_F(PathDeviationsTest, FittedOffsetIsKnownBetterThanItsFileSays) {

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -102,8 +103,46 @@ TEST(WaveSpectrum, LeadsTheFilmsModulusToTheRightWavelength) {
 TEST(WaveSpectrum, RefusesWhatTellsNoWave) {
   std::vector<WavePoint> points = points_of({}, 0.05);
   EXPECT_THROW(WaveSpectrum(points, {4, 2}), InputError);
+  EXPECT_THAT(
+      [&] {
+        WaveSpectrum(points, {1e-6, 8});
+      },
+      testing::ThrowsMessage<InputError>(testing::HasSubstr("/fit/waves/shortest")));
   points.resize(20);
   EXPECT_THROW(WaveSpectrum(points, {2, 8}), InputError);
+}
+
+// Answer, intervals and profiles are of one and the same cost.
+TEST(WaveSpectrum, WavesLeadAndPointsDecide) {
+  const Camera camera = test::make_camera();
+  const Scene scene = test::drag_scene(2);
+  FitCase fit = test::three_parameters();
+  fit.parameters.pop_back();
+  FitInput input{scene, camera, test::make_tracks(scene, camera, 4, 0.05, 4), fit, {}};
+  const FitResult plain = run_fit(input);
+  input.options.waves = WaveBand{3, 8, 0.001};
+  const FitResult led = run_fit(input);
+  ASSERT_TRUE(plain.converged && led.converged) << led.status;
+  EXPECT_NEAR(led.final_cost / plain.final_cost, 1, 1e-4) << "that of the points";
+  for (std::size_t k = 0; k < plain.parameters.size(); ++k) {
+    const FittedParameter &a = led.parameters[k], &b = plain.parameters[k];
+    EXPECT_LT(std::fabs(std::log(a.value / b.value)), 0.15 * b.sigma) << a.name;
+    EXPECT_NEAR(a.sigma / b.sigma, 1, 0.02) << a.name;
+  }
+  ASSERT_EQ(led.stages.size(), 1u);
+  EXPECT_GT(led.stages[0].forward_runs, 0);
+  EXPECT_THAT(led.notes, testing::Contains(testing::HasSubstr("of its deviations")));
+  const auto is_waves = [](const auto& m) { return m.quantity.starts_with("waves_amplitude"); };
+  EXPECT_TRUE(std::any_of(led.measured.begin(), led.measured.end(), is_waves));
+  for (const FittedMeasurement& m : led.measured)
+    EXPECT_TRUE(!m.quantity.starts_with("waves_length") || m.value > 0)
+        << "a frame without waves has no length";
+  double most = 0;  // else this test says nothing
+  for (std::size_t k = 0; k < plain.parameters.size(); ++k)
+    most = std::max(most, std::fabs(std::log(led.stages[0].values[k] / plain.parameters[k].value)) /
+                              plain.parameters[k].sigma);
+  std::printf("waves alone would have moved the answer by %.2f deviations\n", most);
+  EXPECT_GT(most, 0.3);
 }
 
 TEST(WaveSpectrum, DerivativesOfAFitMatchDifferences) {

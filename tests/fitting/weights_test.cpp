@@ -47,6 +47,20 @@ TEST(FrameWeights, FramesOfWeightZeroAreNotThere) {
   EXPECT_NEAR(with.evaluate(with.initial()).cost, without.evaluate(without.initial()).cost, 1e-9);
 }
 
+// A weight that halves every frame is denormal after a thousand: the covariance it divides would be infinite.
+TEST(FrameWeights, WhatWeighsNextToNothingIsNotThere) {
+  FitCase fit = film_alone();
+  fit.frame_weights = {{2, 0, 1, 0.001}};
+  EXPECT_EQ(frame_weight(fit.frame_weights, 3), 0);
+  const Camera camera = test::make_camera();
+  const TrackSet tracks = tracks_of(kFrames);
+  FitProblem problem(test::drag_scene(kFrames), fit, camera, tracks);
+  EXPECT_FALSE(problem.evaluate(problem.initial()).failed);
+  fit.frame_weights = {{1, 0, 1e-10, 0}};
+  EXPECT_THAT([&] { FitProblem(test::drag_scene(kFrames), fit, camera, tracks); },
+              testing::ThrowsMessage<InputError>(HasSubstr("/fit/frame_weights")));
+}
+
 // Information is what the weight says: of the frames' own noise, with that of frame 0 as it was, or of everything.
 TEST(FrameWeights, DivideVariances) {
   const Camera camera = test::make_camera();
@@ -83,6 +97,23 @@ TEST(FrameWeights, ClipsCountByTheirs) {
   const double one = cost(1, 1) / 2;
   EXPECT_GT(one, 1);
   EXPECT_NEAR(cost(1, 0.25), 1.25 * one, 1e-9 * one);
+}
+
+// Weights say how much counts, not how large the noise is: chi-square per degree stays where it was.
+TEST(FrameWeights, DoNotDiluteChiSquare) {
+  const TrackSet tracks = tracks_of(2);
+  FitCase fit = film_alone();
+  fit.parameters = {test::fitted("/skin/layers/film/youngs_modulus")};  // where the truth has it
+  const auto chi = [&](double right) {
+    std::vector<FitClip> clips(2);
+    for (FitClip& clip : clips)
+      clip.scene = test::drag_scene(2), clip.cameras = {test::make_camera()}, clip.tracks = tracks;
+    clips[0].name = "left", clips[1].name = "right", clips[1].weight = right;
+    JointProblem problem(clips, fit);
+    EXPECT_NEAR(problem.clip(1).sum_of_weights(), right * problem.clip(1).num_observations(), 1e-9);
+    return 2 * problem.evaluate(problem.initial()).cost / problem.degrees_of_freedom();
+  };
+  EXPECT_NEAR(chi(0.1) / chi(1), 1, 0.05);
 }
 
 // Late frames in which points slip: where they weigh little the answer is that of the early ones, with wider intervals.
