@@ -108,7 +108,8 @@ TEST(TangentKernel, AgreesWithDualNumbersForEveryDamperAndInstructionSet) {
     double worst = 0;
     for (const DamperScheme scheme : kSchemes)
       for (const int order : {1, 2, 3, 4}) {
-        const double size = order < 4 ? 0.2 : 0.03;  // random ones of high order turn points nearly inside out
+        const double size =
+            order < 4 ? 0.2 : 0.03;  // random ones of high order turn points nearly inside out
         expect_same(skin_case(tables.skin, true, scheme, order, 2, size),
                     skin_case(dual, true, scheme, order, 2, size), worst);
       }
