@@ -168,11 +168,9 @@ std::vector<Rule> contact_rules() {
        .type = path,
        .rival = "path",
        .needs_one_of_pair = true,
-       .doc =
-           "CSV of the path: time,x,y,z[,qw,qx,qy,qz] in s, mm and unit quaternions. Columns of how well it "
-           "is "
-           "known may follow, for fits: sigma_x,sigma_y,sigma_z in mm, or the covariances of `rhytid finger` "
-           "in mm²."},
+       .doc = "CSV of the path: time,x,y,z[,qw,qx,qy,qz] in s, mm and unit quaternions. How well it is "
+              "known may follow, for fits: sigma_x,sigma_y,sigma_z in mm, or the covariances of "
+              "`rhytid finger` in mm²."},
       {.pointer = "/colliders/*/path",
        .type = array,
        .min = 1,
