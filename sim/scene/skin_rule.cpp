@@ -11,10 +11,11 @@ int prism_degree(const SkinScene& skin) {
   return skin.rule == RuleKind::sheet ? kSheetDegrees[skin.order - 1] : skin.prism_degree;
 }
 int triangle_degree(const SkinScene& skin) {
-  return std::min(12, skin.triangle_degree > 0 ? skin.triangle_degree : 2 * skin.order + 2);
+  return std::min(12, skin.triangle_degree > 0 ? skin.triangle_degree : 2 * skin.order);
 }
 int thickness_points(const SkinScene& skin, int order) {
-  return skin.thickness_points > 0 ? skin.thickness_points : order + 1;
+  if (skin.thickness_points > 0) return skin.thickness_points;
+  return std::max(2, order) + (skin.volume == VolumeQuadrature::reduced ? 1 : 0);
 }
 
 }  // namespace
