@@ -37,7 +37,7 @@ struct EnumNames<VolumeQuadrature> {
 };
 template <>
 struct EnumNames<RuleKind> {
-  static constexpr std::array<std::string_view, 2> words{"product", "sheet"};
+  static constexpr std::array<std::string_view, 3> words{"product", "full", "sheet"};
 };
 template <>
 struct EnumNames<ShapeKind> {

@@ -17,7 +17,7 @@ enum class RimCondition { clamped, sliding, free };
 enum class ThicknessScheme { stacked, composite };
 enum class LigamentForm { exponential, fung_quadratic };
 enum class VolumeQuadrature { full, reduced };
-enum class RuleKind { product, sheet };
+enum class RuleKind { product, full, sheet };
 enum class ShapeKind { sphere, plane, imls, capsule, ellipsoid };
 
 struct LayerScene {
@@ -171,9 +171,9 @@ struct SkinScene {
   int order = 3;  ///< p
   ThicknessScheme scheme = ThicknessScheme::stacked;
   int composite_order = 3;            ///< q when composite
-  int triangle_degree = 0;            ///< 0 = 2p+2 (10 for p = 4)
-  int thickness_points = 0;           ///< per layer; 0 = q + 1
-  RuleKind rule = RuleKind::product;  ///< sheet: the prism rule of the publication's sheets for this p
+  int triangle_degree = 0;            ///< 0 = 2p, or 2p + 2 with the full rule
+  int thickness_points = 0;  ///< per layer; 0 = max(q, 2), or q + 1 with the full rule or reduced volume
+  RuleKind rule = RuleKind::product;  ///< skin_rule.h
   int prism_degree = 0;  ///< of a prism rule in place of the product of the two above; 0 = the product
   VolumeQuadrature volume = VolumeQuadrature::full;
   int contact_degree = 0;  ///< triangle degree on contact and ligament surfaces; 0 = max(10, 2p+2)

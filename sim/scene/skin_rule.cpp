@@ -11,11 +11,13 @@ int prism_degree(const SkinScene& skin) {
   return skin.rule == RuleKind::sheet ? kSheetDegrees[skin.order - 1] : skin.prism_degree;
 }
 int triangle_degree(const SkinScene& skin) {
-  return std::min(12, skin.triangle_degree > 0 ? skin.triangle_degree : 2 * skin.order);
+  if (skin.triangle_degree > 0) return skin.triangle_degree;
+  return 2 * skin.order + (skin.rule == RuleKind::full ? 2 : 0);
 }
 int thickness_points(const SkinScene& skin, int order) {
   if (skin.thickness_points > 0) return skin.thickness_points;
-  return std::max(2, order) + (skin.volume == VolumeQuadrature::reduced ? 1 : 0);
+  if (skin.rule == RuleKind::full || skin.volume == VolumeQuadrature::reduced) return order + 1;
+  return std::max(2, order);
 }
 
 }  // namespace

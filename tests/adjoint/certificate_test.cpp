@@ -80,7 +80,10 @@ void expect_sharp(const CertificateReport& report) {
 }
 
 TEST(Certificate, StackedClampedEveryParameterClass) {
-  CertifiedCase c(test::drag_scene(2, 10), test::coarse());
+  // With the default rule a point at the rim of the contact bends one of the remainders (slope 2.16).
+  std::vector<std::string> settings = test::coarse();
+  settings.emplace_back("/skin/quadrature/rule=full");
+  CertifiedCase c(test::drag_scene(2, 10), settings);
   ASSERT_TRUE(c.run.complete) << c.run.failure;
   CertificateOptions options;
   options.addresses = required_addresses();

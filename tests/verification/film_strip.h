@@ -23,6 +23,7 @@ struct Stack {
 struct Scheme {
   const char* name;
   int composite_order, soft_order, soft_elements;
+  RuleKind rule = RuleKind::full;  ///< or product
 };
 
 inline std::vector<StackLayer> layers_of(const Stack& s) {
@@ -36,10 +37,11 @@ inline std::vector<StackElement> fine_elements() {
 
 /// The same polynomials and Gauss points as the simulator's elements.
 inline std::vector<StackElement> elements_of(const Scheme& s) {
-  if (s.composite_order > 0) return {{2, s.composite_order, s.composite_order + 1}};
+  const int more = s.rule == RuleKind::full ? 1 : 0;
+  if (s.composite_order > 0) return {{2, s.composite_order, s.composite_order + more}};
   std::vector<StackElement> e(static_cast<std::size_t>(s.soft_elements),
-                              {1, s.soft_order, s.soft_order + 1, 1.0 / s.soft_elements});
-  e.push_back({1, 2, 3});
+                              {1, s.soft_order, s.soft_order + more, 1.0 / s.soft_elements});
+  e.push_back({1, 2, 2 + more});
   return e;
 }
 
@@ -118,6 +120,7 @@ class Strip {
     Scene s = slab_scene(length, 2, stack.soft, scheme.soft_elements, 4, scheme.soft_order);
     s.skin.surface.grid_size = {length, length / 2};
     s.skin.surface.grid_cells = {2, 1};
+    s.skin.rule = scheme.rule;
     if (scheme.composite_order > 0) {
       s.skin.scheme = ThicknessScheme::composite;
       s.skin.composite_order = scheme.composite_order;

@@ -18,7 +18,8 @@
 namespace rhytid {
 namespace {
 
-enum class Volume { full, reduced, one_point };
+/// of_rule: every term has the points of the default rule, q through the thickness and degree 2p in the plane.
+enum class Volume { full, reduced, one_point, of_rule };
 
 SkinMesh slab(int p, int q, int cells, int layers) {
   ExtrusionOptions o;
@@ -29,16 +30,17 @@ SkinMesh slab(int p, int q, int cells, int layers) {
 
 /// Skin terms as a scene makes them for `volume`.
 std::vector<Term> slab_terms(const SkinMesh& mesh, Volume volume) {
+  const bool of_rule = volume == Volume::of_rule, is_whole = of_rule || volume == Volume::full;
   std::vector<Term> terms;
-  terms.emplace_back("skin", elastic_skin_kernels(), ElasticSkinLaw{volume == Volume::full ? 1.0 : 0.0});
-  if (volume != Volume::full) terms.emplace_back("volume", volume_kernels(), VolumeLaw{});
+  terms.emplace_back("skin", elastic_skin_kernels(), ElasticSkinLaw{is_whole ? 1.0 : 0.0});
+  if (!is_whole) terms.emplace_back("volume", volume_kernels(), VolumeLaw{});
   for (int layer = 0; layer < static_cast<int>(mesh.element_layers.size()); ++layer) {
     const int q = mesh.element_layers[layer].order;
     for (Term& term : terms) {
       const bool is_volume = term.kernels().ntheta == 1;
-      const int points = !is_volume ? q + 1 : volume == Volume::reduced ? q : 1;
+      const int points = of_rule ? std::max(2, q) : !is_volume ? q + 1 : volume == Volume::reduced ? q : 1;
       TermGroup g = prism_group(mesh, layer, mesh.element_layers[layer].slabs.front(),
-                                triangle_rule(std::min(12, 2 * mesh.order + 2)), points);
+                                triangle_rule(2 * mesh.order + (of_rule ? 0 : 2)), points);
       for (int s = 0; s < term.kernels().ntheta; ++s)
         g.theta.push_back({ThetaSlot::Kind::constant, is_volume ? SkinTheta::bulk : s, {}});
       term.add_group(std::move(g));
@@ -124,7 +126,10 @@ TEST(Locking, TableByPoissonsRatio) {
       {"P4xP3 n=2", 4, 3, 2, 1, Volume::full, {0.4, 4.2, 4.8, 4.8}},
       {"P4xP3 n=3", 4, 3, 3, 1, Volume::full, {0.4, 4.2, 4.8, 4.8}},
       {"P4xP2 n=2, two layers", 4, 2, 2, 2, Volume::full, {0.4, 9.1, 23, 28}},
-      {"P4xP3 n=3, volume reduced", 4, 3, 3, 1, Volume::reduced, {0.3, 4.0, 4.7, 4.8}}};
+      {"P4xP3 n=3, volume reduced", 4, 3, 3, 1, Volume::reduced, {0.3, 4.0, 4.7, 4.8}},
+      {"P3xP2 n=3, default rule", 3, 2, 3, 1, Volume::of_rule, {0.05, -2.1, -2.7, -2.8}},
+      {"P4xP2 n=3, default rule", 4, 2, 3, 1, Volume::of_rule, {0.05, -2.1, -2.7, -2.8}},
+      {"P3xP3 n=3, default rule", 3, 3, 3, 1, Volume::of_rule, {0.4, 4.3, 4.8, 4.9}}};
   const double nus[] = {0.3, 0.49, 0.499, 0.4999};
   for (int k = 0; k < 4; ++k) {
     const double nu = nus[k], reference = least_energy(4, 4, 3, 2, nu, Volume::full);

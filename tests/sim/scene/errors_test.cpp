@@ -189,6 +189,7 @@ TEST(SceneWarnings, NameWhatIsDoubtful) {
   // An elastic layer has no relaxation time to identify.
   EXPECT_THAT(warnings({"/skin/layers/film/relaxation_time=8 ms", "/skin/layers/film/relaxing_fraction=0"}),
               ElementsAre());
+  EXPECT_THAT(warnings({"/skin/layers/soft/order=2", "/skin/quadrature/thickness_points=0"}), ElementsAre());
   EXPECT_THAT(warnings({"/skin/layers/soft/order=2"}),
               ElementsAre(HasSubstr("delays wrinkling"), HasSubstr("/skin/layers/soft/order: 2 locks")));
   EXPECT_THAT(warnings({"/skin/layers/soft/order=2", "/skin/quadrature/volume=reduced"}),

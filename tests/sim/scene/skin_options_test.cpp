@@ -254,7 +254,7 @@ TEST(SkinQuadrature, RulesThatSeeTooLittleAreRefusedAndWeakOnesAreNamed) {
       error_of([&] { drag(settings(3, 4, "prism_degree=5")); }),
       HasSubstr("/skin/quadrature/prism_degree: got 16 points, so 96 strains, for the 144 ways to deform"));
   EXPECT_THAT(error_of([&] { drag(settings(3, 2, "triangle_degree=1")); }),
-              HasSubstr("/skin/quadrature: got 3 points"));
+              HasSubstr("/skin/quadrature: got 2 points"));
   EXPECT_THAT(scene_warnings(drag(settings(2, 1, "thickness_points=1"))),
               Contains(HasSubstr("needs 2 and 2")));
   // Each of the composite's two slabs has the rule: seen, but weak.
@@ -263,7 +263,8 @@ TEST(SkinQuadrature, RulesThatSeeTooLittleAreRefusedAndWeakOnesAreNamed) {
 }
 
 TEST(SkinQuadrature, ReducedVolumeHasPointsOfItsOwnAndTheSameHistory) {
-  const SceneModel full(drag({})), reduced(drag({"/skin/quadrature/volume=reduced"}));
+  const std::string rule = "/skin/quadrature/rule=full";
+  const SceneModel full(drag({rule})), reduced(drag({rule, "/skin/quadrature/volume=reduced"}));
   EXPECT_EQ(full.model().history_size(), reduced.model().history_size());
   const auto& terms = reduced.model().terms;
   const auto volume =
