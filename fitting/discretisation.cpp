@@ -8,23 +8,28 @@
 
 #include "fitting/fit_logs.h"
 #include "sim/core/error.h"
+#include "sim/scene/skin_rule.h"
 
 namespace rhytid::fitting {
 namespace {
 
 constexpr int kHighestOrder = 4;
 
-/// The product rule that suits the orders, whatever the scene asked for.
-void accurate_rule(SkinScene& skin) {
-  skin.rule = RuleKind::product;
-  skin.triangle_degree = skin.thickness_points = skin.prism_degree = 0;
+/// The product rule of the scene, full or not, with explicit numbers of points where they are enough for the orders; the
+/// default one in place of a prism rule.
+void set_product_rule(SkinScene& skin, int triangle_degree, int thickness_points) {
+  if (skin.rule == RuleKind::sheet) skin.rule = RuleKind::product;
+  skin.prism_degree = 0;
+  skin.triangle_degree = triangle_degree;
+  skin.thickness_points = thickness_points;
+  const std::vector<SkinRuleCheck> checks = check_skin_rules(skin);
+  if (std::any_of(checks.begin(), checks.end(), [](const SkinRuleCheck& c) { return c.sees_too_little(); }))
+    skin.triangle_degree = skin.thickness_points = 0;
 }
 
 FinerScene finer_thickness(const Scene& scene) {
   FinerScene finer{"thickness", {}, scene};
   SkinScene& skin = finer.scene.skin;
-  accurate_rule(skin);
-  skin.triangle_degree = scene.skin.triangle_degree;
   std::string orders;
   const bool is_composite = skin.scheme == ThicknessScheme::composite;
   skin.scheme = ThicknessScheme::stacked;
@@ -39,6 +44,7 @@ FinerScene finer_thickness(const Scene& scene) {
     }
     orders += (orders.empty() ? "" : " and ") + std::to_string(layer.order);
   }
+  set_product_rule(skin, scene.skin.triangle_degree, 0);
   finer.change = (is_composite ? "layers stacked with orders " : "orders through the layers ") + orders +
                  (is_composite ? " instead of one element" : " or elements halved");
   return finer;
@@ -47,11 +53,8 @@ FinerScene finer_thickness(const Scene& scene) {
 FinerScene finer_plane(const Scene& scene) {
   FinerScene finer{"plane", {}, scene};
   SkinScene& skin = finer.scene.skin;
-  const int thickness_points =
-      skin.rule == RuleKind::product && skin.prism_degree == 0 ? skin.thickness_points : 0;
-  accurate_rule(skin);
-  skin.thickness_points = thickness_points;
   skin.order += skin.order < kHighestOrder ? 1 : -1;
+  set_product_rule(skin, 0, scene.skin.thickness_points);
   finer.change =
       "order " + std::to_string(skin.order) + " in the plane instead of " + std::to_string(scene.skin.order);
   return finer;

@@ -170,8 +170,8 @@ struct SkinScene {
   SurfaceScene surface;
   int order = 3;  ///< p
   ThicknessScheme scheme = ThicknessScheme::stacked;
-  int composite_order = 3;            ///< q when composite
-  int triangle_degree = 0;            ///< 0 = 2p, or 2p + 2 with the full rule
+  int composite_order = 3;   ///< q when composite
+  int triangle_degree = 0;   ///< 0 = 2p, or 2p + 2 with the full rule
   int thickness_points = 0;  ///< per layer; 0 = max(q, 2), or q + 1 with the full rule or reduced volume
   RuleKind rule = RuleKind::product;  ///< skin_rule.h
   int prism_degree = 0;  ///< of a prism rule in place of the product of the two above; 0 = the product

@@ -5,8 +5,8 @@
 // With enough of them a rule may still be too weak. Strains in the plane have degree p − 1 in the plane and q
 // through the thickness, so that their energy has twice that; through the thickness one degree less, q Gauss
 // points, is enough beyond q = 1 (a bar that is bent and twisted stores 0.1 % less). That, and degree 2p in the
-// plane, is the default, which data/bench/pareto.md found better and cheaper than the full rule of degree 2p + 2
-// and q + 1 points: what it leaves out of an energy is less than what the polynomials add by locking. The
+// plane, is the default, which data/bench/pareto.md found better than the full rule of degree 2p + 2 and q + 1
+// points, and no dearer: what it leaves out of an energy is less than what the polynomials add by locking. The
 // publication's rules for sheets, linear or quadratic through the thickness, have that and little more.
 #pragma once
 

@@ -279,6 +279,10 @@ void check_skin(const LocatedJson& scene) {
   const json& root = scene.json;
   const json& quadrature = root["skin"]["quadrature"];
   const bool is_sheet = quadrature["rule"] == "sheet";
+  if (quadrature["rule"] == "full" && quadrature["prism_degree"].get<int>() > 0) {
+    const std::string at = "/skin/quadrature/prism_degree";
+    throw InputError(scene.where(at) + ": " + at, "both it and the full rule", "one of the two");
+  }
   if (is_sheet || quadrature["prism_degree"].get<int>() > 0) {
     const char* const prism = is_sheet ? "the sheet rule" : "prism_degree";
     for (const char* key : {"triangle_degree", "thickness_points", "prism_degree"})

@@ -50,43 +50,50 @@ void warn_of_layer(const LayerScene& layer, const Scene& scene, std::vector<std:
                  " is not used, since the composite scheme has one element through all layers"));
 }
 
-/// Whether a layer's rule has more Gauss points through it than q, which is what locks order 2.
-bool locks(const SkinScene& skin, size_t layer) {
-  const std::vector<SkinRuleCheck> checks = check_skin_rules(skin);
-  return layer < checks.size() && checks[layer].thickness >= 2 * checks[layer].order;
+/// What would unlock a layer of order 1 or 2, one element thick: more than q Gauss points through it, or exactness to
+/// as much, lock order 2. Empty when nothing locks.
+std::string unlocking(const SkinScene& skin, size_t layer) {
+  const LayerScene& l = skin.layers[layer];
+  if (skin.scheme != ThicknessScheme::stacked || skin.volume == VolumeQuadrature::reduced || l.order > 2 ||
+      l.elements > 1)
+    return {};
+  if (l.order == 1) return "take order 2 or 3";
+  if (check_skin_rules(skin)[layer].thickness < 2 * l.order) return {};
+  if (skin.thickness_points > l.order)
+    return sentence("take ", l.order, " for /skin/quadrature/thickness_points, or order 3");
+  return "take \"product\" for /skin/quadrature/rule, or order 3";
 }
 
-/// With the full rule a film on a soft layer needs cubic thickness order below (errors of the onset strain:
-/// tests/verification/README.md, Wrinkling).
+/// Below a film a layer that locks buckles late (errors of the onset strain: tests/verification/README.md, Wrinkling).
 void warn_of_wrinkling_stack(const SkinScene& skin, std::vector<std::string>& warnings) {
   for (size_t i = 0; i + 1 < skin.layers.size(); ++i) {
     const LayerScene &soft = skin.layers[i], &film = skin.layers[i + 1];
-    if (skin.scheme == ThicknessScheme::stacked && film.youngs_modulus > 10 * soft.youngs_modulus &&
-        soft.order < 3 && soft.elements == 1 && locks(skin, i))
+    const std::string remedy = unlocking(skin, i);
+    if (film.youngs_modulus > 10 * soft.youngs_modulus && !remedy.empty())
       warnings.push_back(sentence("/skin/layers/", soft.name, "/order: ", soft.order, " under the stiffer ",
-                                  film.name, " delays wrinkling by 14 to 26 % with more Gauss points through ",
-                                  "the layer than that; take the rule \"product\", or order 3"));
+                                  film.name, " delays wrinkling by 14 % and more",
+                                  soft.order == 2 ? " with this quadrature; " : "; ", remedy));
   }
   if (skin.scheme == ThicknessScheme::composite && skin.composite_order < 3 && skin.layers.size() > 1)
     warnings.push_back(sentence("/skin/composite_order: ", skin.composite_order,
                                 " through several layers delays wrinkling 3 to 9 times; take 3 or 4"));
 }
 
-/// Squeezed between finger and bone a nearly incompressible layer must bulge, which takes a cubic (figures:
-/// tests/verification/README.md, Locking).
+/// Squeezed between finger and bone a nearly incompressible layer must bulge, which takes a cubic, or points that do not
+/// ask for it (figures: tests/verification/README.md, Locking).
 void warn_of_locking(const Scene& scene, std::vector<std::string>& warnings) {
   const SkinScene& skin = scene.skin;
-  if (!scene.base || skin.volume == VolumeQuadrature::reduced || skin.scheme != ThicknessScheme::stacked)
-    return;
+  if (!scene.base) return;
   for (size_t i = 0; i < skin.layers.size(); ++i) {
     const LayerScene& layer = skin.layers[i];
     // A film that is bent, not squeezed, does not mind.
     const bool is_film = i > 0 && layer.thickness < 0.5 * skin.layers[i - 1].thickness;
-    if (layer.order < 3 && layer.elements == 1 && layer.poissons_ratio >= 0.45 && !is_film && locks(skin, i))
+    const std::string remedy = unlocking(skin, i);
+    if (layer.poissons_ratio >= 0.45 && !is_film && !remedy.empty())
       warnings.push_back(sentence("/skin/layers/", layer.name, "/order: ", layer.order,
                                   " locks at a Poisson's ratio of ", layer.poissons_ratio,
-                                  " with more Gauss points through the layer than that: squeezed skin comes "
-                                  "out twice as stiff and more; take the rule \"product\" or order 3"));
+                                  layer.order == 2 ? " with this quadrature" : "",
+                                  ": squeezed skin comes out twice as stiff and more; ", remedy));
   }
 }
 

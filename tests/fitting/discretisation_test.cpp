@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "sim/scene/skin_rule.h"
 #include "tests/fitting/synthetic_tracks.h"
 
 namespace rhytid::fitting {
@@ -64,6 +65,33 @@ TEST(FinerScenes, ChangeOneThingEach) {
   EXPECT_EQ(of_published[0].scene.skin.rule, RuleKind::product);
   EXPECT_EQ(of_published[1].scene.skin.order, 3) << "there is no higher one";
   for (const FinerScene& one : of_published) EXPECT_NO_THROW(SceneModel{one.scene}) << one.change;
+}
+
+// A rule of more points than the default stays one, or the shift would be that of the rule.
+TEST(FinerScenes, KeepTheRule) {
+  const Scene full = test::drag_scene(2, {"/skin/order=3", "/skin/quadrature/rule=full"});
+  for (const FinerScene& one : finer_scenes(full))
+    EXPECT_EQ(one.scene.skin.rule, RuleKind::full) << one.change;
+  const Scene given = test::drag_scene(
+      2, {"/skin/order=3", "/skin/quadrature/triangle_degree=8", "/skin/quadrature/thickness_points=3"});
+  const std::vector<FinerScene> finer = finer_scenes(given);
+  EXPECT_EQ(finer[0].scene.skin.triangle_degree, 8);
+  EXPECT_EQ(finer[0].scene.skin.thickness_points, 0);
+  EXPECT_EQ(finer[1].scene.skin.thickness_points, 3);
+  EXPECT_EQ(finer[2].scene.skin.triangle_degree, 8);
+}
+
+// Points that are enough for the scene's own orders need not be for one more.
+TEST(FinerScenes, HaveRulesThatSeeEveryDeformation) {
+  for (const Scene& scene :
+       {test::drag_scene(2, {"/skin/order=3", "/skin/quadrature/triangle_degree=4",
+                             "/skin/quadrature/thickness_points=3"}),
+        test::drag_scene(2, {"/skin/order=3", R"(/skin/scheme="composite")", "/skin/composite_order=3",
+                             "/skin/quadrature/triangle_degree=4"}),
+        test::drag_scene(2, {"/skin/order=3", "/skin/quadrature/prism_degree=5"})})
+    for (const FinerScene& one : finer_scenes(scene))
+      for (const SkinRuleCheck& check : check_skin_rules(one.scene.skin))
+        EXPECT_FALSE(check.sees_too_little()) << one.change;
 }
 
 TEST(Discretisation, ShiftsAreWhatFinerFitsFind) {

@@ -116,6 +116,31 @@ TEST(FrameWeights, DoNotDiluteChiSquare) {
   EXPECT_NEAR(chi(0.1) / chi(1), 1, 0.05);
 }
 
+// A clip that states half its deviations stands out by its own chi-square, whatever it weighs.
+TEST(FrameWeights, EachClipHasItsOwnChiSquare) {
+  const auto fit_with = [&](double weight) {
+    std::vector<FitClip> clips(2);
+    for (FitClip& clip : clips) clip.scene = test::drag_scene(2), clip.cameras = {test::make_camera()};
+    clips[0].name = "as stated", clips[0].tracks = tracks_of(2);
+    clips[1].name = "twice that",
+    clips[1].tracks = test::make_tracks(clips[1].scene, clips[1].cameras[0], 2, 0.02, 4);
+    for (Track& track : clips[1].tracks.tracks)
+      for (Observation& o : track.observations) o.covariance /= 4;
+    clips[1].weight = weight;
+    return run_fit(JointFitInput{.clips = clips, .options = film_alone()});
+  };
+  for (const double weight : {1.0, 0.2}) {
+    const FitResult result = fit_with(weight);
+    ASSERT_TRUE(result.converged) << result.status;
+    std::printf("weight %g: %.3f and %.3f\n", weight, result.clips[0].reduced_chi_square,
+                result.clips[1].reduced_chi_square);
+    EXPECT_NEAR(result.clips[0].reduced_chi_square, 1, 0.25);
+    EXPECT_NEAR(result.clips[1].reduced_chi_square, 4, 1);
+    EXPECT_NEAR(result.clips[1].degrees_of_freedom / (2 * weight * result.clips[1].num_observations), 1,
+                0.02);
+  }
+}
+
 // Late frames in which points slip: where they weigh little the answer is that of the early ones, with wider intervals.
 TEST(FrameWeights, EarlyFramesDecideWhenLateOnesAreWrong) {
   const Camera camera = test::make_camera();

@@ -56,7 +56,8 @@ class FeaturesBenchmark : public Benchmark {
         "Runs a drag over a patch of skin, or FILE, with all features, and again with one of them left out: "
         "viscosity, ligaments, bone base, friction, contact (the skin under the finger is then moved along "
         "its "
-        "path), second layer, Fung's factor; and with one more: pre-stretch, reduced volume rule, substeps, "
+        "path), second layer, Fung's factor; and with one more: pre-stretch, full quadrature, reduced volume "
+        "rule, substeps, "
         "files "
         "and pictures, states kept for gradients. Repeats take turns. Then starts rhytid-forward and rhytid. "
         "Writes features.csv, programs.csv and features.md into -o DIR."};

@@ -173,8 +173,11 @@ TEST(SceneErrors, ParsedJsonIsNamedByItsFile) {
 }
 
 TEST(SceneWarnings, NameWhatIsDoubtful) {
+  using ::testing::AllOf;
+  using ::testing::Each;
   using ::testing::ElementsAre;
   using ::testing::HasSubstr;
+  using ::testing::SizeIs;
   const auto warnings = [](const std::vector<std::string>& overrides) {
     return scene_warnings(parse_scene_text(full_scene, "a.json", overrides));
   };
@@ -192,8 +195,14 @@ TEST(SceneWarnings, NameWhatIsDoubtful) {
   EXPECT_THAT(warnings({"/skin/layers/soft/order=2", "/skin/quadrature/thickness_points=0"}), ElementsAre());
   EXPECT_THAT(warnings({"/skin/layers/soft/order=2"}),
               ElementsAre(HasSubstr("delays wrinkling"), HasSubstr("/skin/layers/soft/order: 2 locks")));
-  EXPECT_THAT(warnings({"/skin/layers/soft/order=2", "/skin/quadrature/volume=reduced"}),
-              ElementsAre(HasSubstr("delays wrinkling")));
+  EXPECT_THAT(warnings({"/skin/layers/soft/order=2"}),
+              Each(HasSubstr("take 2 for /skin/quadrature/thickness_points, or order 3")));
+  EXPECT_THAT(warnings({"/skin/layers/soft/order=2", "/skin/quadrature/thickness_points=0",
+                        "/skin/quadrature/rule=full"}),
+              Each(HasSubstr("take \"product\" for /skin/quadrature/rule, or order 3")));
+  EXPECT_THAT(warnings({"/skin/layers/soft/order=1", "/skin/quadrature/thickness_points=0"}),
+              AllOf(SizeIs(2), Each(HasSubstr("take order 2 or 3"))));
+  EXPECT_THAT(warnings({"/skin/layers/soft/order=2", "/skin/quadrature/volume=reduced"}), ElementsAre());
   EXPECT_THAT(warnings({"/skin/scheme=composite", "/skin/composite_order=2"}),
               ElementsAre(HasSubstr("3 or 4")));
   // What another shape would read.
