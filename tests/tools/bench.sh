@@ -54,9 +54,9 @@ column "$folder/one.csv" flops_per_point | awk '!($1 > 700 && $1 < 36 * 45 + 300
 # Features cost nothing where they are not; the settling step of tension and substeps are steps.
 expect 0 features --nodes 600 --frames 2 --repeats 1 --starts 1 -o "$folder/features"
 features() { grep -c "^patch_600,$1" "$folder/features/features.csv"; }
-[ "$(features .)" = 14 ] && [ "$(features 'without ligaments,.*ligaments')" = 1 ] && [ "$(features 'all features,.*ligaments')" = 0 ] ||
+[ "$(features .)" = 15 ] && [ "$(features 'without ligaments,.*ligaments')" = 1 ] && [ "$(features 'all features,.*ligaments')" = 0 ] ||
   fail "variants of features"
-column "$folder/features/features.csv" steps | sort | uniq -c | awk '{ n[$2] = $1 } END { exit !(n[2] == 12 && n[3] == 1 && n[4] == 1) }' ||
+column "$folder/features/features.csv" steps | sort | uniq -c | awk '{ n[$2] = $1 } END { exit !(n[2] == 13 && n[3] == 1 && n[4] == 1) }' ||
   fail "steps of variants"
 column "$folder/features/features.csv" states_MB | awk '$1 > 0 { n++; if (n == 1) less = $1; else more = $1 } END { exit !(n == 2 && more > 2 * less) }' ||
   fail "states kept"
