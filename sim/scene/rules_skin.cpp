@@ -181,9 +181,9 @@ std::vector<Rule> skin_rules() {
            "product: a triangle rule of degree 2p times q Gauss points (at least 2) through each layer, the "
            "best for its time (data/bench/pareto.md): films on a soft layer wrinkle earlier than with more "
            "points, which is nearer to exact. full: degree 2p + 2 and q + 1 points, exact for the stiffness "
-           "of straight "
-           "elements, so that energies are upper bounds. sheet: the prism rules that the "
-           "publication uses for its sheets, of total degree 1 (2 points), 4, 5, 6 for p = 1, 2, 3, 4. They "
+           "of straight elements, so that energies are upper bounds. sheet: the prism rules that the "
+           "publication "
+           "uses for its sheets, of total degree 1 (2 points), 4, 5, 6 for p = 1, 2, 3, 4. They "
            "are meant for elements that are quadratic through the thickness (linear at p = 1); for higher "
            "orders they are too weak, and refused where deformations would cost no energy."},
       {.pointer = "/skin/quadrature/triangle_degree",
@@ -210,8 +210,7 @@ std::vector<Rule> skin_rules() {
        .fallback = to_string(skin.volume),
        .options = enum_words<VolumeQuadrature>(),
        .doc = "reduced: the volumetric term has one Gauss point fewer through each layer than the rest, "
-              "which has q + 1 "
-              "then; it unlocks q = 2 near nu = 0.5."},
+              "which has q + 1 then; it unlocks q = 2 near nu = 0.5."},
       {.pointer = "/skin/quadrature/contact_degree",
        .type = integer,
        .fallback = skin.contact_degree,

@@ -59,6 +59,7 @@ std::string unlocking(const SkinScene& skin, size_t layer) {
     return {};
   if (l.order == 1) return "take order 2 or 3";
   if (check_skin_rules(skin)[layer].thickness < 2 * l.order) return {};
+  if (skin.prism_degree > 0) return "take 0 for /skin/quadrature/prism_degree, or order 3";
   if (skin.thickness_points > l.order)
     return sentence("take ", l.order, " for /skin/quadrature/thickness_points, or order 3");
   return "take \"product\" for /skin/quadrature/rule, or order 3";

@@ -23,7 +23,8 @@ struct SceneVariant {
 };
 
 /// The scene itself first, then one variant per feature: without it where the scene has it. Some have a variant with
-/// them where the scene is without: pre-stretch, the full quadrature, reduced volume rule, substeps; files and states are always added.
+/// them where the scene is without: pre-stretch, the full quadrature, reduced volume rule, substeps; files and states
+/// are always added.
 /// Without colliders the part of the skin under the first one is moved along its path instead.
 std::vector<SceneVariant> scene_variants(const Scene& scene);
 
