@@ -80,7 +80,7 @@ void expect_sharp(const CertificateReport& report) {
 }
 
 TEST(Certificate, StackedClampedEveryParameterClass) {
-  // With the scene's 0.4 a point of the contact goes over from onset to pressed within 1e-6 of the gradient's direction.
+  // With the scene's 0.4 one remainder along the gradient has slope 2.16 at h = 8e-7 where no point switches; why is not known.
   std::vector<std::string> settings = test::coarse();
   settings.emplace_back("/colliders/finger/friction/coefficient=0.45");
   CertifiedCase c(test::drag_scene(2, 10), settings);

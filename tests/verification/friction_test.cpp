@@ -95,6 +95,7 @@ TEST(Friction, SpringBlockSticksThenSlidesAtMuN) {
       slab_under_plane("quintic", {{0, Vec3(0, 0, 0)}, {0.25, Vec3(0, 0, -0.1)}, {2.25, Vec3(1.2, 0, -0.1)}});
   scene.colliders[0].friction->slip_speed = 0.02;  // against 0.6 mm/s of the plane
   scene.skin.layers[0].relaxing_fraction = 0;      // N stays what the press made it
+  scene.skin.rule = RuleKind::full;                // with the default rule N lags by 5.5e-3
   const SceneModel m(scene);
   const Model& model = m.model();
   const VectorXd native = m.native();
@@ -134,7 +135,7 @@ TEST(Friction, SpringBlockSticksThenSlidesAtMuN) {
   EXPECT_LT(slip[7], 0.5);
   EXPECT_LT(ratio[8], 0.9 * kFriction);
   for (int i = 7; i < 53; ++i) {
-    EXPECT_LE(ratio[i], kFriction * (1 + 6e-3)) << i;  // the lag of N
+    EXPECT_LE(ratio[i], kFriction * (1 + 5e-3)) << i;  // the lag of N
     EXPECT_GE(ratio[i + 1], ratio[i] - 5e-3 * kFriction) << i;
   }
 }

@@ -67,7 +67,8 @@ std::vector<SceneVariant> scene_variants(const Scene& scene) {
     without("without pre-stretch", [](json& s) { s["skin"].erase("pre_stretch"); });
   else
     without("with pre-stretch 1.05", [](json& s) { s["skin"]["pre_stretch"] = {{"stretch", 1.05}}; });
-  without("with the full quadrature", [](json& s) { s["skin"]["quadrature"]["rule"] = "full"; });
+  if (scene.skin.rule == RuleKind::product && scene.skin.prism_degree == 0)
+    without("with the full quadrature", [](json& s) { s["skin"]["quadrature"]["rule"] = "full"; });
   without("with reduced volume rule", [](json& s) { s["skin"]["quadrature"]["volume"] = "reduced"; });
   if (scene.time.substeps > 1)
     without("without substeps", [](json& s) { s["time"]["substeps"] = 1; });
