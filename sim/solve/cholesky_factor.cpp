@@ -9,6 +9,7 @@
 #include "sim/solve/block_pattern_impl.h"
 #include "sim/solve/cholmod_session.h"
 #include "sim/solve/supernodal_cholesky.h"
+#include "sim/solve/supernodal_solve.h"
 
 namespace rhytid {
 
@@ -20,10 +21,10 @@ struct CholeskyFactor::Impl {
     void operator()(cholmod_factor* factor) const { cholmod_free_factor(&factor, common); }
   };
   const BlockPattern* pattern;
-  // CHOLMOD writes its workspace and status into the session even when it only solves.
-  mutable CholmodSession session;
+  CholmodSession session;
   std::unique_ptr<cholmod_factor, Release> factor{nullptr, {&session}};
   std::optional<SupernodalCholesky> numbers;
+  std::optional<SupernodalSolve> solver;
   bool usable = false;
   Precision precision = Precision::full;
   double smallest_pivot = 0, largest_pivot = 0, flops = 0;
@@ -31,8 +32,10 @@ struct CholeskyFactor::Impl {
   void measure_pivots();
   MatrixXd permuted(const MatrixXd& rhs) const;
   void permute_back(const Eigen::Ref<const MatrixXd>& x, MatrixXd& result) const;
-  /// Columns in the factor's order, in place, with a factor in single precision.
-  void solve_single(MatrixXd& x) const;
+  /// Columns in the factor's order, in place.
+  void solve(MatrixXd& x) const;
+  /// What the numbers may be worked on with.
+  int threads() const;
 };
 
 CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
@@ -53,7 +56,8 @@ CholeskyFactor::Impl::Impl(const BlockPattern& p) : pattern(&p) {
   cholmod_change_factor(CHOLMOD_REAL, /*to_ll=*/1, /*to_super=*/1, /*to_packed=*/1, /*to_monotonic=*/1,
                         factor.get(), &session);
   throw_on_cholmod_error(*&session);
-  numbers.emplace(*factor);
+  numbers.emplace(Supernodes(*factor));
+  solver.emplace(Supernodes(*factor));
 }
 
 void CholeskyFactor::Impl::measure_pivots() {
@@ -91,17 +95,25 @@ void CholeskyFactor::Impl::permute_back(const Eigen::Ref<const MatrixXd>& x, Mat
       result.col(k).segment<3>(3 * b) = x.col(k).segment<3>(3 * p.position[b]);
 }
 
-void CholeskyFactor::Impl::solve_single(MatrixXd& x) const {
+int CholeskyFactor::Impl::threads() const {
+  return blas_is_reentrant() ? num_threads() : 1;
+}
+
+void CholeskyFactor::Impl::solve(MatrixXd& x) const {
+  // Before the scope: an OpenBLAS over OpenMP makes its one thread the default of OpenMP.
+  const int threads = this->threads();
   const SingleThreadBlas blas;
-  Eigen::VectorXf column;
-  for (Eigen::Index k = 0; k < x.cols(); ++k) {
-    // Scaled, since floats overflow at 1e38 and lose digits below 1e-38.
-    const double scale = x.col(k).cwiseAbs().maxCoeff();
-    if (!(scale > 0)) continue;
-    column = (x.col(k) / scale).cast<float>();
-    numbers->solve(column.data());
-    x.col(k) = scale * column.cast<double>();
+  const int columns = static_cast<int>(x.cols());
+  if (precision == Precision::full) {
+    solver->solve(x.data(), columns, threads);
+    return;
   }
+  // Scaled, since floats overflow at 1e38 and lose digits below 1e-38.
+  Eigen::RowVectorXd scale = x.cwiseAbs().colwise().maxCoeff();
+  for (double& s : scale) s = s > 0 ? s : 1;
+  Eigen::MatrixXf single = (x * scale.cwiseInverse().asDiagonal()).cast<float>();
+  solver->solve(single.data(), columns, threads);
+  x = single.cast<double>() * scale.asDiagonal();
 }
 
 CholeskyFactor::CholeskyFactor(const BlockPattern& pattern) : impl_(std::make_unique<Impl>(pattern)) {}
@@ -114,8 +126,7 @@ bool CholeskyFactor::factorize(const BlockMatrix& matrix, double shift, Precisio
   impl.usable = false;
   impl.smallest_pivot = impl.largest_pivot = 0;
   const BlockPattern::Impl& p = impl.pattern->impl();
-  // Before the scope: an OpenBLAS over OpenMP makes its one thread the default of OpenMP.
-  const int threads = blas_is_reentrant() ? num_threads() : 1;
+  const int threads = impl.threads();  // before the scope, as in solve
   const SingleThreadBlas blas;
   impl.precision = precision;
   const auto factorize_in = [&]<class Real>(Real) {
@@ -141,28 +152,8 @@ MatrixXd CholeskyFactor::solve(const MatrixXd& rhs) const {
   require(rhs.rows() == 3 * p.num_blocks, "CholeskyFactor::solve: wrong number of rows");
   if (rhs.cols() == 0) return rhs;
   MatrixXd permuted = impl.permuted(rhs), result;
-  if (impl.precision == Precision::single) {
-    impl.solve_single(permuted);
-    impl.permute_back(permuted, result);
-    return result;
-  }
-
-  cholmod_dense view{};
-  view.nrow = view.d = static_cast<std::size_t>(rhs.rows());
-  view.ncol = static_cast<std::size_t>(rhs.cols());
-  view.nzmax = view.nrow * view.ncol;
-  view.x = permuted.data();
-  view.xtype = CHOLMOD_REAL;
-  view.dtype = CHOLMOD_DOUBLE;
-  const SingleThreadScope single_thread;
-  impl.session->status = CHOLMOD_OK;
-  const auto release = [&](cholmod_dense* x) { cholmod_free_dense(&x, &impl.session); };
-  const std::unique_ptr<cholmod_dense, decltype(release)> solution(
-      cholmod_solve(CHOLMOD_LDLt, impl.factor.get(), &view, &impl.session), release);
-  throw_on_cholmod_error(*&impl.session);
-
-  const Eigen::Map<const MatrixXd> x(static_cast<const double*>(solution->x), rhs.rows(), rhs.cols());
-  impl.permute_back(x, result);
+  impl.solve(permuted);
+  impl.permute_back(permuted, result);
   return result;
 }
 

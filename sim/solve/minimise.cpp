@@ -22,18 +22,22 @@ constexpr int kMaxLineSearchFailures = 4;  // in a row, each with a more cautiou
 constexpr int kRawPatience = 5, kPatience = 20;
 constexpr int kMaxNegativeCurvatureExits = 10;
 constexpr double kLbfgsRefreshStep = 1e-6;  // the publication, "Non-Linear Solver"
+// A whole step of Newton's to the tolerance that leaves at most this share of the residual: over it the Hessian hardly
+// changes, so that its factor at the step's start is the certificate of its end.
+constexpr double kCertifyingStep = 0.1;
 constexpr unsigned kNegativeCurvatureSeed = 20240229;
 
 class Minimisation {
  public:
   Minimisation(Objective& objective, VectorXd& q, const MinimiserOptions& options, CholeskyFactor& factor,
-               BlockMatrix& matrix, const IterationCallback& callback)
+               BlockMatrix& matrix, const IterationCallback& callback, GivenFactor given)
       : objective_(objective),
         q_(q),
         options_(options),
         factor_(factor),
         matrix_(matrix),
         callback_(callback),
+        given_(given),
         single_(
             options.method != Minimiser::lbfgs_literal &&
             (options.precision == FactorPrecision::mixed ||
@@ -55,8 +59,8 @@ class Minimisation {
   std::optional<Status> accept(Iterate next);
   std::optional<Status> note_iteration();
   bool small() const { return report_.residual <= report_.tolerance; }
-  /// The factor of the raw Hessian; `final` in double precision whatever steers.
-  bool factor_raw(bool final);
+  /// The factor of the raw Hessian; `full` in double precision whatever steers.
+  bool factor_raw(bool full);
   bool factor_projected(bool full = false);
   /// matrix_ + shift·I: in single precision while that is trusted, and in double precision where it fails. It is
   /// no longer trusted where the other then succeeds.
@@ -77,6 +81,7 @@ class Minimisation {
   CholeskyFactor& factor_;
   BlockMatrix& matrix_;
   const IterationCallback& callback_;
+  GivenFactor given_;
   bool single_;  ///< factors in single precision are worth trying
 
   MinimiserReport report_;
@@ -132,9 +137,9 @@ bool Minimisation::factorize(double shift, bool full) {
   return true;
 }
 
-bool Minimisation::factor_raw(bool final) {
+bool Minimisation::factor_raw(bool full) {
   objective_.hessian(at_.q, Curvature::raw, matrix_);
-  return factorize(0, final);
+  return factorize(0, full);
 }
 
 bool Minimisation::factor_projected(bool full) {
@@ -250,10 +255,15 @@ MinimiserStatus Minimisation::newton() {
   const bool always_projected = options_.method == Minimiser::newton_projected;
   const bool wants_raw = options_.certify_minimum || options_.polish;
   int projected_left = 0, failures = 0;
+  if (given_ == GivenFactor::near && factor_.usable() && options_.keep_factor &&
+      options_.method == Minimiser::newton) {
+    LbfgsMemory memory(options_.lbfgs_memory);
+    if (const auto stop = keep_factor(memory)) return *stop;
+  }
   for (;;) {
     if (small() && !wants_raw) return Status::converged;
     const bool try_raw = small() || (!always_projected && projected_left == 0);
-    bool raw = try_raw && factor_raw(/*final=*/small());
+    bool raw = try_raw && factor_raw(/*full=*/small() && options_.polish);
     if (small()) {
       if (raw && options_.polish) polish();
       if (raw || !options_.certify_minimum) return Status::converged;
@@ -298,11 +308,13 @@ MinimiserStatus Minimisation::newton() {
     }
     failures = 0;
     shift_ = kShift;
-    const bool keep =
-        options_.keep_factor && raw && found.step == 1 && found.next.gradient.norm() <= report_.residual;
+    const double before = report_.residual;
+    const bool keep = options_.keep_factor && raw && found.step == 1 && found.next.gradient.norm() <= before;
+    const bool certifies = !options_.polish && raw && found.step == 1;
     LbfgsMemory memory(options_.lbfgs_memory);
     if (keep) memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);
     if (const auto stop = accept(std::move(found.next))) return *stop;
+    if (certifies && small() && report_.residual <= kCertifyingStep * before) return Status::converged;
     if (!small() && stagnates(slope, noise, raw ? kRawPatience : kPatience)) return Status::stagnated;
     if (!keep) continue;
     if (const auto stop = keep_factor(memory)) return *stop;
@@ -425,12 +437,13 @@ const char* name(MinimiserStatus status) {
 }
 
 MinimiserReport minimise(Objective& objective, VectorXd& q, const MinimiserOptions& options,
-                         CholeskyFactor& factor, BlockMatrix& matrix, const IterationCallback& callback) {
+                         CholeskyFactor& factor, BlockMatrix& matrix, const IterationCallback& callback,
+                         GivenFactor given) {
   options.validate();
   require(&matrix.pattern() == &objective.pattern(),
           "minimise: the matrix has another pattern than the objective");
   require(q.size() == objective.pattern().num_unknowns(), "minimise: wrong number of unknowns");
-  return Minimisation(objective, q, options, factor, matrix, callback).run();
+  return Minimisation(objective, q, options, factor, matrix, callback, given).run();
 }
 
 }  // namespace rhytid

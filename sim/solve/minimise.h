@@ -21,7 +21,8 @@ enum class Minimiser {
   lbfgs_literal,     ///< L-BFGS to its end as published: no Newton, hence no certificate and no polish
 };
 
-/// What the factors that steer the iterations are computed in. The certificate, the polish and whatever follows them
+/// What the factors that steer the iterations are computed in, and that of the certificate where no polish follows it:
+/// where single precision does not find a Hessian definite, double precision decides. The polish and whatever follows it
 /// (derivatives) always have one in double precision, and so has `lbfgs_literal`.
 enum class FactorPrecision {
   automatic,  ///< mixed for factors of kMixedFromFlops operations and more
@@ -103,12 +104,21 @@ struct MinimiserReport {
 /// q is the last accepted point).
 using IterationCallback = std::function<bool(int iteration, double energy, double residual)>;
 
+/// What the factor holds that minimise() is given.
+enum class GivenFactor {
+  none,
+  /// The factor of a nearby problem's Hessian near the start: `newton` begins with steps of L-BFGS over it while they pay.
+  near
+};
+
 /// Minimises from q (in/out). On return with status converged and certify_minimum, `factor` holds the raw
-/// Hessian's factor and `matrix` the raw Hessian, at the solution or, after a polish, one step before it.
+/// Hessian's factor and `matrix` the raw Hessian, at the solution or one step before it (a polish, or Newton's last
+/// when it ended at the tolerance and left a tenth of the residual or less).
 /// `lbfgs` hands over to Newton when its gradient test holds (certificate) or when it can go no further;
 /// `lbfgs_literal` ends there, with the last projected factor.
 [[nodiscard]] MinimiserReport minimise(Objective& objective, VectorXd& q, const MinimiserOptions& options,
                                        CholeskyFactor& factor, BlockMatrix& matrix,
-                                       const IterationCallback& callback = {});
+                                       const IterationCallback& callback = {},
+                                       GivenFactor given = GivenFactor::none);
 
 }  // namespace rhytid

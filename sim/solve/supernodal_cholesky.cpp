@@ -23,10 +23,6 @@ void strsm_(const char* side, const char* uplo, const char* trans, const char* d
             const int* n, const float* alpha, const float* a, const int* lda, float* b, const int* ldb);
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void spotrf_(const char* uplo, const int* n, float* a, const int* lda, int* info);
-void strsv_(const char* uplo, const char* trans, const char* diag, const int* n, const float* a,
-            const int* lda, float* x, const int* incx);
-void sgemv_(const char* trans, const int* m, const int* n, const float* alpha, const float* a, const int* lda,
-            const float* x, const int* incx, const float* beta, float* y, const int* incy);
 }
 
 namespace rhytid {
@@ -91,14 +87,8 @@ class SupernodalCholesky::Progress {
   std::atomic<bool> failed_{false};
 };
 
-SupernodalCholesky::SupernodalCholesky(cholmod_factor& factor)
-    : factor_(&factor),
-      super_(static_cast<const int*>(factor.super)),
-      row_start_(static_cast<const int*>(factor.pi)),
-      value_start_(static_cast<const int*>(factor.px)),
-      rows_(static_cast<const int*>(factor.s)),
-      num_super_(static_cast<int>(factor.nsuper)) {
-  for (int s = 0; s < num_super_; ++s) {
+SupernodalCholesky::SupernodalCholesky(const Supernodes& supernodes) : supernodes_(supernodes) {
+  for (int s = 0; s < supernodes_.count(); ++s) {
     first_panel_.push_back(static_cast<int>(panels_.size()));
     for (int first = 0; first < width(s); first += kPanelWidth)
       panels_.push_back({s, first, std::min(first + kPanelWidth, width(s)), 0, 0});
@@ -110,17 +100,18 @@ SupernodalCholesky::SupernodalCholesky(cholmod_factor& factor)
 }
 
 void SupernodalCholesky::find_sources() {
-  std::vector<int> super_of(factor_->n);
-  for (int s = 0; s < num_super_; ++s) std::fill(&super_of[super_[s]], &super_of[0] + super_[s + 1], s);
+  std::vector<int> super_of(supernodes_.size());
+  for (int s = 0; s < supernodes_.count(); ++s)
+    std::fill(&super_of[supernodes_.first(s)], &super_of[0] + supernodes_.first(s + 1), s);
   // Visits (panel, source) for all pairs, sources ascending.
   const auto for_pairs = [&](auto&& visit) {
-    for (int d = 0; d < num_super_; ++d) {
+    for (int d = 0; d < supernodes_.count(); ++d) {
       const int* row = rows(d);
       const int n = height(d);
       for (int k = width(d), end = k; k < n; k = end) {
         const int s = super_of[row[k]];
-        const int panel = first_panel_[s] + (row[k] - super_[s]) / kPanelWidth;
-        const int past = super_[s] + panels_[panel].last;
+        const int panel = first_panel_[s] + (row[k] - supernodes_.first(s)) / kPanelWidth;
+        const int past = supernodes_.first(s) + panels_[panel].last;
         for (end = k; end < n && row[end] < past;) ++end;
         visit(panel, Source{d, k, end});
       }
@@ -144,8 +135,8 @@ void SupernodalCholesky::find_sources() {
 
 void SupernodalCholesky::divide_work() {
   // Work of a supernode where it is a source or itself, summed over its subtree; parents follow children.
-  std::vector<double> work(num_super_, 0.0);
-  std::vector<int> parent(num_super_, -1);
+  std::vector<double> work(supernodes_.count(), 0.0);
+  std::vector<int> parent(supernodes_.count(), -1);
   for (const Panel& panel : panels_)
     for (int k = panel.source_begin; k < panel.source_end; ++k) {
       const Source& source = sources_[k];
@@ -154,16 +145,16 @@ void SupernodalCholesky::divide_work() {
       if (parent[source.super] < 0 || panel.super < parent[source.super]) parent[source.super] = panel.super;
     }
   double total = 0;
-  for (int s = 0; s < num_super_; ++s) {
+  for (int s = 0; s < supernodes_.count(); ++s) {
     work[s] += static_cast<double>(width(s)) * width(s) * height(s);
     total += work[s];
   }
-  for (int s = 0; s < num_super_; ++s)
+  for (int s = 0; s < supernodes_.count(); ++s)
     if (parent[s] >= 0) work[parent[s]] += work[s];
 
   // root[s]: the topmost supernode of the small subtree that s belongs to, -1 above them.
-  std::vector<int> root(num_super_, -1);
-  for (int s = num_super_ - 1; s >= 0; --s) {
+  std::vector<int> root(supernodes_.count(), -1);
+  for (int s = supernodes_.count() - 1; s >= 0; --s) {
     if (work[s] > kPieceShare * total) continue;
     root[s] = parent[s] >= 0 && root[parent[s]] >= 0 ? root[parent[s]] : s;
   }
@@ -172,15 +163,15 @@ void SupernodalCholesky::divide_work() {
     for (int panel = first_panel_[s]; panel < first_panel_[s + 1]; ++panel) piece_panels_.push_back(panel);
   };
   const auto close = [&] { piece_start_.push_back(static_cast<int>(piece_panels_.size())); };
-  std::vector<std::vector<int>> members(num_super_);
-  for (int s = 0; s < num_super_; ++s)
+  std::vector<std::vector<int>> members(supernodes_.count());
+  for (int s = 0; s < supernodes_.count(); ++s)
     if (root[s] >= 0) members[root[s]].push_back(s);
-  for (int s = 0; s < num_super_; ++s) {
+  for (int s = 0; s < supernodes_.count(); ++s) {
     if (members[s].empty()) continue;
     for (const int member : members[s]) add(member);
     close();
   }
-  for (int s = 0; s < num_super_; ++s) {
+  for (int s = 0; s < supernodes_.count(); ++s) {
     if (root[s] >= 0) continue;
     for (int panel = first_panel_[s]; panel < first_panel_[s + 1]; ++panel) {
       piece_panels_.push_back(panel);
@@ -198,7 +189,7 @@ void SupernodalCholesky::assemble(const Panel& panel, const Matrix& a, Workspace
   for (int c = panel.first; c < panel.last; ++c) {
     Real* const column = x + static_cast<std::ptrdiff_t>(c) * n;
     std::fill(column + panel.first, column + n, Real(0));
-    const int j = super_[s] + c;
+    const int j = supernodes_.first(s) + c;
     // The diagonal entry is the first of its column.
     for (int e = a.column_start[j]; e < a.column_start[j + 1]; ++e)
       column[work.place[a.rows[e]]] = static_cast<Real>(a.values[e]);
@@ -295,7 +286,7 @@ bool SupernodalCholesky::factorize(const int* column_start, const int* rows, con
         // Whatever happens, a panel that was taken is finished, or those that wait for it would do so for ever.
         try {
           if (work.place.empty()) {
-            work.place.resize(factor_->n);
+            work.place.resize(supernodes_.size());
             work.target.resize(static_cast<std::size_t>(largest_height_));
             work.product.resize(product_size_);
           }
@@ -309,34 +300,6 @@ bool SupernodalCholesky::factorize(const int* column_start, const int* rows, con
     if (failure) std::rethrow_exception(failure);
   });
   return !progress.failed();
-}
-
-void SupernodalCholesky::solve(float* x) const {
-  std::vector<float> below(static_cast<std::size_t>(largest_height_));
-  const int step = 1;
-  const float one = 1, zero = 0;
-  // A supernode's rows below its own columns, gathered from x or scattered into it.
-  for (int s = 0; s < num_super_; ++s) {
-    const int n = height(s), columns = width(s), left = n - columns;
-    const float* const l = block<float>(s);
-    strsv_("L", "N", "N", &columns, l, &n, x + super_[s], &step);
-    if (left == 0) continue;
-    sgemv_("N", &left, &columns, &one, l + columns, &n, x + super_[s], &step, &zero, below.data(), &step);
-    const int* const row = rows(s) + columns;
-    for (int i = 0; i < left; ++i) x[row[i]] -= below[static_cast<std::size_t>(i)];
-  }
-  const float minus_one = -1;
-  for (int s = num_super_ - 1; s >= 0; --s) {
-    const int n = height(s), columns = width(s), left = n - columns;
-    const float* const l = block<float>(s);
-    if (left > 0) {
-      const int* const row = rows(s) + columns;
-      for (int i = 0; i < left; ++i) below[static_cast<std::size_t>(i)] = x[row[i]];
-      sgemv_("T", &left, &columns, &minus_one, l + columns, &n, below.data(), &step, &one, x + super_[s],
-             &step);
-    }
-    strsv_("L", "T", "N", &columns, l, &n, x + super_[s], &step);
-  }
 }
 
 template bool SupernodalCholesky::factorize<double>(const int*, const int*, const double*, double, int);

@@ -1,6 +1,5 @@
 // The numbers of a supernodal Cholesky factor in double or single precision, computed on several threads with
-// the same bits for any number of them. CHOLMOD supplies the structure (supernodes, rows, storage) and solves with
-// those in double precision; those in single precision, which CHOLMOD 3 does not know, are solved with here.
+// the same bits for any number of them. CHOLMOD supplies the structure (supernodes, rows, storage).
 //
 //   panel P of supernode s: columns J of L, rows i ≥ J
 //   L(i, P) = A(i, P) − Σ_d L(i, d) L(J, d)ᵀ − Σ_e L(i, e) L(J, e)ᵀ   d earlier supernodes, e earlier panels of s
@@ -13,18 +12,18 @@
 // Internal to sim/solve.   Tests   tests/sim/solve/block_matrix_test.cpp, solve_threads_test.cpp
 #pragma once
 
-#include <cholmod.h>
-
 #include <cstddef>
 #include <vector>
+
+#include "sim/solve/supernodes.h"
 
 namespace rhytid {
 
 /// The numeric phase for one factor: what is computed from what is found once.
 class SupernodalCholesky {
  public:
-  /// `factor` is supernodal with values allocated (any), 32-bit indices; it must outlive this.
-  explicit SupernodalCholesky(cholmod_factor& factor);
+  /// Of a factor with room for values.
+  explicit SupernodalCholesky(const Supernodes& supernodes);
 
   /// Overwrites the factor's values with those of A + shift·I, A the lower triangle by columns in the factor's
   /// order. Real is double or float; floats take the first half of the same storage, which CHOLMOD must not read
@@ -34,13 +33,10 @@ class SupernodalCholesky {
   [[nodiscard]] bool factorize(const int* column_start, const int* rows, const double* values, double shift,
                                int threads);
 
-  /// x [size of the matrix], in the factor's order: L Lᵀ x = b, b overwritten; L as factorize<float> left it.
-  void solve(float* x) const;
-
   /// Calls visit(pivot) with every diagonal entry of L.
   template <class Real, class Visit>
   void for_diagonal(Visit&& visit) const {
-    for (int s = 0; s < num_super_; ++s)
+    for (int s = 0; s < supernodes_.count(); ++s)
       for (int c = 0; c < width(s); ++c)
         visit(block<Real>(s)[static_cast<std::ptrdiff_t>(c) * (height(s) + 1)]);
   }
@@ -64,12 +60,12 @@ class SupernodalCholesky {
   };
   class Progress;
 
-  int width(int s) const { return super_[s + 1] - super_[s]; }
-  int height(int s) const { return row_start_[s + 1] - row_start_[s]; }
-  const int* rows(int s) const { return rows_ + row_start_[s]; }
+  int width(int s) const { return supernodes_.width(s); }
+  int height(int s) const { return supernodes_.height(s); }
+  const int* rows(int s) const { return supernodes_.rows(s); }
   template <class Real>
   Real* block(int s) const {
-    return static_cast<Real*>(factor_->x) + value_start_[s];
+    return supernodes_.block<Real>(s);
   }
   void find_sources();
   void divide_work();
@@ -80,9 +76,7 @@ class SupernodalCholesky {
   template <class Real>
   void subtract_source(const Panel& panel, const Source& source, Workspace<Real>& work) const;
 
-  cholmod_factor* factor_;
-  const int *super_, *row_start_, *value_start_, *rows_;
-  int num_super_;
+  Supernodes supernodes_;
   std::vector<Panel> panels_;      ///< by supernode and column
   std::vector<int> first_panel_;   ///< [num_super + 1]
   std::vector<Source> sources_;    ///< ascending by supernode within a panel

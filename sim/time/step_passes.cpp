@@ -20,9 +20,10 @@ StepSolver::StepSolver(const Model& model, const VectorXd& native, const Minimis
   if (std::none_of(model.terms.begin(), model.terms.end(), lags)) passes_ = 1;
 }
 
-MinimiserReport StepSolver::solve_pass(VectorXd& q, const VectorXd& held, const IterationCallback& callback) {
+MinimiserReport StepSolver::solve_pass(VectorXd& q, const VectorXd& held, const IterationCallback& callback,
+                                       GivenFactor given) {
   const bool moved = q != held;
-  MinimiserReport report = minimise(*problem_, q, options_, factor_, matrix_, callback);
+  MinimiserReport report = minimise(*problem_, q, options_, factor_, matrix_, callback, given);
   if (report.converged() || report.status == MinimiserStatus::interrupted || !moved) return report;
   q = held;
   const MinimiserReport given_up = std::move(report);
@@ -35,16 +36,20 @@ MinimiserReport StepSolver::solve(const StepInfo& step, const State& old, const 
                                   const IterationCallback& callback) {
   problem_.emplace(*model_, *native_, step, old);
   MinimiserReport guess;
+  GivenFactor given = GivenFactor::none;
   VectorXd q = start ? model_->to_unknowns(*start) : problem_->first_guess(guess);
   if (!start && !model_->constraints.moved.empty()) {
     const VectorXd response = problem_->response_to_given_motion(factor_, matrix_, guess);
     if (response.size() > 0) {
       guess.evaluations += 2;
-      if (problem_->energy(response, nullptr) < problem_->energy(q, nullptr)) q = response;
+      if (problem_->energy(response, nullptr) < problem_->energy(q, nullptr)) {
+        q = response;
+        given = GivenFactor::near;
+      }
     }
   }
   const VectorXd held = start ? q : model_->to_unknowns(old.u);
-  MinimiserReport first = solve_pass(q, held, callback);
+  MinimiserReport first = solve_pass(q, held, callback, given);
   first.add_work(guess);
   return solve_later_passes(step, std::move(first), std::move(q), held, callback);
 }
@@ -69,7 +74,8 @@ MinimiserReport StepSolver::solve_later_passes(const StepInfo& step, MinimiserRe
     problem_.reset();  // it refers to lagged_
     lagged_ = std::move(next);
     problem_.emplace(*model_, *native_, step, lagged_);
-    MinimiserReport report = solve_pass(q, held, callback);
+    // Only what the friction is lagged from has changed.
+    MinimiserReport report = solve_pass(q, held, callback, GivenFactor::near);
     report.iterations += total.iterations;
     report.lbfgs_iterations += total.lbfgs_iterations;
     report.negative_curvature_exits += total.negative_curvature_exits;

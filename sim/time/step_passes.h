@@ -41,7 +41,8 @@ class StepSolver {
   const std::vector<VectorXd>& earlier_passes() const { return earlier_; }
 
  private:
-  MinimiserReport solve_pass(VectorXd& q, const VectorXd& held, const IterationCallback& callback);
+  MinimiserReport solve_pass(VectorXd& q, const VectorXd& held, const IterationCallback& callback,
+                             GivenFactor given);
   MinimiserReport solve_later_passes(const StepInfo& step, MinimiserReport first, VectorXd q,
                                      const VectorXd& held, const IterationCallback& callback);
 
