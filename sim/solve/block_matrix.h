@@ -59,9 +59,9 @@ class BlockMatrix {
 /// condition number: a preconditioner, no certificate.
 enum class Precision { full, single };
 
-/// Supernodal Cholesky over OpenBLAS: CHOLMOD analyses once per object, whose pattern must outlive it, and
-/// solves on the calling thread; numbers come from num_threads() threads, with the same bits for any number of
-/// them (supernodal_cholesky.h). Throws std::bad_alloc or std::length_error when the factor does not fit.
+/// Supernodal Cholesky over OpenBLAS: CHOLMOD analyses once per object, whose pattern must outlive it; numbers and
+/// solves are our own, on num_threads() threads with the same bits for any number of them
+/// (supernodal_cholesky.h, supernodal_solve.h). Throws std::bad_alloc or std::length_error when the factor does not fit.
 class CholeskyFactor {
  public:
   explicit CholeskyFactor(const BlockPattern& pattern);
@@ -73,8 +73,7 @@ class CholeskyFactor {
                                Precision precision = Precision::full);
   bool usable() const;
   Precision precision() const;  ///< of the last factorisation
-  /// Solves A X = B for [num_unknowns][k] right-hand sides, unpermuted order. One factor serves one thread at
-  /// a time, also here (CHOLMOD's workspace is shared).
+  /// Solves A X = B for [num_unknowns][k] right-hand sides, unpermuted order.
   MatrixXd solve(const MatrixXd& rhs) const;
   /// The same with one step of iterative refinement against `matrix`, which must be the matrix factorised.
   MatrixXd solve(const BlockMatrix& matrix, const MatrixXd& rhs) const;

@@ -218,21 +218,22 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
   // Forward and backward: the factor is read twice.
   const double factor_bytes = 2. * 8 * report.factor_entries;
   if (!stopped) {
-    // A direction from every factor in single precision, and from one in double for each iteration that had none.
-    add({.name = "solve, 1 right-hand side",
-         .calls = std::max(0., iterations - per_step(single)),
-         .bytes = factor_bytes,
-         .is_serial = true},
+    add({.name = "solve, 1 right-hand side", .calls = single > 0 ? 0 : iterations, .bytes = factor_bytes},
         [&] { solution = factor.solve(rhs.col(0)); });
-    add({.name = "solve, 8 right-hand sides", .bytes = factor_bytes, .is_serial = true},
-        [&] { solution = factor.solve(rhs); });
+    add({.name = "solve, 8 right-hand sides", .bytes = factor_bytes}, [&] { solution = factor.solve(rhs); });
   }
   add({.name = "factorisation, single", .calls = per_step(single), .flops = factor.factor_flops()},
       [&] { positive = factor.factorize(matrix, 0, Precision::single) && positive; });
   // On stiff matrices single precision may fail; a run then corrects no direction by it either.
-  if (!stopped && factor.usable())
-    add({.name = "direction, corrected", .calls = per_step(single), .is_serial = true},
+  if (!stopped && factor.usable()) {
+    // Where factors are in single precision every one gives a direction, and serves the iterations that have none.
+    add({.name = "solve, single",
+         .calls = single > 0 ? std::max(0., iterations - per_step(single)) : 0,
+         .bytes = factor_bytes / 2},
+        [&] { solution = factor.solve(rhs.col(0)); });
+    add({.name = "direction, corrected", .calls = per_step(single)},
         [&] { (void)factor.solve_iteratively(matrix, rhs.col(0), kDirectionTolerance, kMaxCorrections); });
+  }
   add({.name = "matrix times vector",
        .bytes = 8. * static_cast<double>(matrix.values().size()),
        .is_serial = true},

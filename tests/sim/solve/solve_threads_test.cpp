@@ -67,8 +67,10 @@ TEST_F(SolveThreads, SameBitsForAnyNumberOfThreads) {
   const BlockPattern pattern = grid_pattern(61, 5);
   const BlockMatrix matrix = random_matrix(pattern);
   const VectorXd rhs = VectorXd::LinSpaced(pattern.num_unknowns(), -1, 1);
+  MatrixXd several(pattern.num_unknowns(), 5);
+  for (int k = 0; k < 5; ++k) several.col(k) = rhs.array().pow(k);
   for (const Precision precision : {Precision::full, Precision::single}) {
-    std::vector<MatrixXd> solutions;
+    std::vector<MatrixXd> solutions, solutions_of_several;
     std::vector<double> pivots;
     for (const int threads : {1, 2, 3, 5, 2}) {
       set_num_threads(threads);
@@ -76,12 +78,19 @@ TEST_F(SolveThreads, SameBitsForAnyNumberOfThreads) {
       for (int repeat = 0; repeat < 3; ++repeat) {
         ASSERT_TRUE(factor.factorize(matrix, 0, precision));
         solutions.push_back(factor.solve(rhs));
+        solutions_of_several.push_back(factor.solve(several));
         pivots.push_back(factor.smallest_pivot());
       }
     }
     EXPECT_LE((matrix.multiply(solutions[0].col(0)) - rhs).norm(),
               (precision == Precision::full ? 1e-10 : 1e-3) * rhs.norm());
+    const double rounding = precision == Precision::full ? 1e-10 : 1e-3;
+    EXPECT_LE((solutions_of_several[0].col(1) - solutions[0]).norm(), rounding * solutions[0].norm());
+    for (int k = 0; k < 5; ++k)
+      EXPECT_LE((matrix.multiply(solutions_of_several[0].col(k)) - several.col(k)).norm(),
+                rounding * several.col(k).norm());
     for (std::size_t k = 1; k < solutions.size(); ++k) {
+      EXPECT_TRUE(solutions_of_several[k] == solutions_of_several[0]) << k;
       EXPECT_TRUE(solutions[k] == solutions[0]) << k;
       EXPECT_EQ(pivots[k], pivots[0]) << k;
     }
