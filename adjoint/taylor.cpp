@@ -14,6 +14,9 @@ namespace rhytid::adjoint {
 
 namespace {
 
+// A deep remainder is looked at again this much closer, and is the gradient's error when it is smaller by as much,
+// but for this; of a remainder of second order it would be the square.
+constexpr double kCloseBy = 0.8, kProportional = 0.1;
 constexpr double kNoiseStep = 1e-8;  // h² is then below rounding, yet the solver has work to do
 
 /// Whether the last `count` slopes lie in the window.
@@ -187,8 +190,26 @@ TaylorSeries taylor_test(const FunctionalDifference& functional, const Parameter
   if (failure.empty() && is_clean(series, options, wanted)) {
     // A small error of the gradient hides below a large parabola: once more as far down as the noise allows.
     const double curvature = std::fabs(series.remainders.back()) / (h * h);
-    const double deep = std::max(h / 1024, std::sqrt(1e3 * noise / curvature));
-    if (deep < h / 8 && evaluate(deep)) ++wanted;
+    const auto deepest = [&] { return std::max(h / 1024, std::sqrt(1e3 * series.noise / curvature)); };
+    const double deep = deepest();
+    if (deep < h / 8 && evaluate(deep)) {
+      ++wanted;
+      if (!is_clean(series, options, 1)) {
+        // What an error of the gradient leaves is proportional to h. One run that ended at a residual far above those
+        // that the noise was measured from is not.
+        const auto [again, switches] = at(kCloseBy * deep);
+        if (failure.empty() && !(std::fabs(again / series.remainders.back() - kCloseBy) < kProportional)) {
+          series.noise = std::max({series.noise, std::fabs(series.remainders.back()), std::fabs(again)});
+          series.steps.pop_back();
+          series.slopes.pop_back();
+          series.remainders.pop_back();
+          series.switches.pop_back();
+          --wanted;
+          const double higher = deepest();
+          if (higher < h / 8 && evaluate(higher)) ++wanted;
+        }
+      }
+    }
   }
   judge(series, options, wanted, at_noise, failure);
   return series;

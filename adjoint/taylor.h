@@ -4,7 +4,9 @@
 //
 // Q is evaluated by solving every step again (resimulate.h). The step h starts at the largest of the series
 // and is halved until three neighbouring slopes d ln ρ / d ln h lie in the window, or ρ has sunk to the noise
-// of Q; then once more at an h as small as the noise allows, which bounds the error of Q'v. Contact and
+// of Q; then once more at an h as small as the noise allows, which bounds the error of Q'v. When that one is out of
+// line and does not shrink in proportion to h either, as what an error of Q'v leaves would, it is noise that was not
+// measured before: it counts as such, and the last h is chosen anew. Contact and
 // friction are only piecewise smooth: points that change piece between p and p + hv bend the parabola, so
 // they are counted, and small h are needed where they are many.
 //
@@ -38,7 +40,7 @@ struct TaylorSeries {
   std::vector<double> steps, remainders;
   std::vector<long> switches;
   std::vector<double> slopes;  ///< one fewer
-  double noise = 0;            ///< of Q, measured at a step so small that ρ is nothing else
+  double noise = 0;  ///< of Q, measured at a step so small that ρ is nothing else, or met on the way
   /// Relative error of Q'v that the last two remainders leave room for: the part of ρ linear in h.
   double first_order_error = 0;
   bool passed = false;

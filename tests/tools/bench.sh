@@ -30,13 +30,13 @@ expect 0 stages "${small[@]}" --seconds 0 -o "$folder/stages"
 grep -q '^patch_600,.*,factorisation,' "$folder/stages/stages.csv" || fail "stages.csv has no factorisation"
 column "$folder/stages/stages.csv" time_ms | awk '!($1 > 0) { bad = 1 } END { exit bad || NR < 20 }' || fail "times of stages"
 # A profile: a step has factors, the last of them the certificate, but fewer than iterations, since some keep the factor;
-# factors and skin have a distance to their limits. With factors in single precision the certificate alone is double.
+# factors and skin have a distance to their limits. Factors in single precision are all a forward run needs, nearly always.
 expect 0 stages "${small[@]}" --seconds 0 --set /solver/factor_precision=mixed -o "$folder/mixed"
 calls() { grep -E "^scene|,$2,|,\"$2\"," "$folder/$1/stages.csv" >"$folder/row" && column "$folder/row" calls_per_step; }
 awk -v f="$(calls stages factorisation)" -v s="$(calls stages factorisation.*single)" -v i="$(calls stages 'feasible step')" \
   'BEGIN { exit !(s == 0 && f >= 2 && f < i) }' || fail "calls in a step"
 awk -v f="$(calls mixed factorisation)" -v s="$(calls mixed factorisation.*single)" -v i="$(calls mixed 'feasible step')" \
-  'BEGIN { exit !(s >= 1 && s < i && f >= 1 && f < i) }' || fail "calls in a step, mixed"
+  'BEGIN { exit !(s >= 1 && s < i && f < 1) }' || fail "calls in a step, mixed"
 column "$folder/stages/stages.csv" share_of_fma_peak_one_thread | awk '$1 > 0 { n++ } END { exit n < 3 }' || fail "shares of the peak"
 [ -s "$folder/stages/patch_600.json" ] || fail "the patch is not kept"
 
