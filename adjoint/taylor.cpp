@@ -196,7 +196,8 @@ TaylorSeries taylor_test(const FunctionalDifference& functional, const Parameter
       ++wanted;
       if (!is_clean(series, options, 1)) {
         // What an error of the gradient leaves is proportional to h. One run that ended at a residual far above those
-        // that the noise was measured from is not.
+        // that the noise was measured from is not; nor may this one start from it, or it would inherit its end.
+        last = {};
         const auto [again, switches] = at(kCloseBy * deep);
         if (failure.empty() && !(std::fabs(again / series.remainders.back() - kCloseBy) < kProportional)) {
           series.noise = std::max({series.noise, std::fabs(series.remainders.back()), std::fabs(again)});

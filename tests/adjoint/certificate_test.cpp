@@ -154,18 +154,17 @@ TEST(Certificate, NoticesAWrongAdjoint) {
 // hundred thousandth off leaves as little, but in proportion to the step.
 TEST(Certificate, ADeepRemainderThatIsNoiseIsNoErrorOfTheGradient) {
   const CertifiedCase& c = small_case();
-  MinimiserOptions loose = c.options.minimiser;
-  loose.polish = false;
-  loose.relative_tolerance = 1e-8;
-  const FunctionalDifference functional(c.scene_model, c.run, *c.output, c.weights, loose);
+  const FunctionalDifference functional(c.scene_model, c.run, *c.output, c.weights, c.options.minimiser);
   const ParameterSpace space(c.scene_model, {"/skin/layers/soft/youngs_modulus"});
   const AdjointResult adjoint = adjoint_sweep(c.model(), c.scene_model.native(), c.run, *c.output, c.weights);
   const VectorXd gradient = space.jacobian().transpose() * adjoint.native_bar, v = VectorXd::Ones(1);
   constexpr double told = 1e-30;
-  const TaylorSeries right = taylor_test(functional, space, v, gradient, told, {});
+  TaylorOptions options;
+  options.first_step = 1e-4;  // a thousandth of its eighth is far below what rounding allows
+  const TaylorSeries right = taylor_test(functional, space, v, gradient, told, options);
   EXPECT_TRUE(right.passed) << right.sentence;
   EXPECT_GT(right.noise, told) << "no run's residual showed: this test tests nothing";
-  const TaylorSeries wrong = taylor_test(functional, space, v, 1.00001 * gradient, told, {});
+  const TaylorSeries wrong = taylor_test(functional, space, v, 1.00001 * gradient, told, options);
   EXPECT_FALSE(wrong.passed) << wrong.sentence;
 }
 
