@@ -116,19 +116,23 @@ nlohmann::json track_settings(const TrackJob& job) {
           {"min_distance", seeds.min_distance_px},
           {"window", job.options.window_px},
           {"redetect", job.options.redetect},
+          {"exposure", job.options.exposure ? nlohmann::json(*job.options.exposure) : nlohmann::json()},
           {"roi", r.empty() ? nlohmann::json() : nlohmann::json({r.x, r.y, r.width, r.height})},
           {"last frame", job.footage.last}};
 }
 
-TrackJob track_job(const std::string& video, const fitting::TrackCase& track) {
+TrackJob track_job(const std::string& video, const fitting::TrackCase& track,
+                   std::optional<double> exposure) {
   TrackJob job;
+  job.options.exposure = exposure;
   job.footage.path = video;
   use_settings(track, job);
   return job;
 }
 
 TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
-                   Progress& progress, const std::optional<fitting::TrackCase>& asked) {
+                   Progress& progress, const std::optional<fitting::TrackCase>& asked,
+                   std::optional<double> exposure) {
   TrackJob job;
   const std::string of_case = fitting::footage_path(c, folder);
   job.footage.path = video.empty() ? of_case : video;
@@ -152,9 +156,10 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
     use_camera(c, job);
   }
   job.of_case = track_settings(job);
-  if (!asked) return job;
-  use_settings(*asked, job);
-  if (job.camera && asked->window != c.track.window) use_camera(c, job);  // the windows stay on the skin
+  job.options.exposure = exposure;
+  if (asked) use_settings(*asked, job);
+  if (job.camera && asked && asked->window != c.track.window)
+    use_camera(c, job);  // the windows stay on the skin
   return job;
 }
 

@@ -14,6 +14,7 @@
 #include "sim/scene/load.h"
 #include "tools/clip_argument.h"
 #include "tools/footage_record.h"
+#include "tools/render/exposure.h"
 #include "tools/render/footage.h"
 #include "tools/render/skin_camera.h"
 #include "tools/render/skin_renderer.h"
@@ -67,6 +68,12 @@ class Render : public Verb {
     app.add_flag("--keep-motion", keep_motion_,
                  "film the truth_motion.bin that is in the folder, if it is of the same scene, instead of "
                  "simulating again");
+    app.add_option(
+           "--exposure", exposure_,
+           "share of the frame interval that the shutter is open, about the frame's time: what moves is "
+           "blurred (default: 0)")
+        ->option_text("FRACTION")
+        ->check(CLI::Range(0.0, 1.0));
     add_clip_option(app, clip_);
   }
 
@@ -93,10 +100,12 @@ class Render : public Verb {
     const fitting::Camera camera =
         c.camera.empty() ? automatic_camera(twin.surface, c.render.width, c.render.height, c.render.tilt)
                          : fitting::read_case_camera(c);
-    if (!film(context, c, truth.scene(), twin.surface, camera, folder)) return ExitCode::interrupted;
+    if (!film(context, c, truth.scene(), twin.surface, camera, exposure_, folder))
+      return ExitCode::interrupted;
     write_markers(c, truth.scene(), twin.surface, camera, folder);
     nlohmann::json record = truth_record(fit, truth, stride, twin.surface.frames());
     record["footage"].update(footage_record(footage_in(c, folder)));
+    record["footage"]["exposure"] = exposure_;
     write_file(in_folder("truth.json"), record.dump(2) + "\n");
     if (twin.complete) return ExitCode::ok;
     context.progress.error("the truth's run ended early: " + twin.failure);
@@ -131,10 +140,13 @@ class Render : public Verb {
 
   /// False when interrupted.
   static bool film(VerbContext& context, const fitting::Case& c, const Scene& truth,
-                   const MovingSurface& surface, const fitting::Camera& camera, const std::string& folder) {
+                   const MovingSurface& surface, const fitting::Camera& camera, double exposure,
+                   const std::string& folder) {
     const SubdividedSurface tessellation(surface.mesh, SurfaceSide::outer,
                                          subdivision_for(surface, camera, 3));
-    const SkinRenderer renderer(surface, tessellation, truth, camera, c.render);
+    const int pictures = pictures_of_exposure(surface, camera, exposure);
+    const MovingSurface exposed = exposed_surface(surface, exposure, pictures);
+    const SkinRenderer renderer(exposed, tessellation, truth, camera, c.render);
     const Vec3 direction = finger_direction(surface.mean_normal(), camera);
     TruthTracker tracker(surface, tessellation, camera, c.render.truth_spacing);
     const std::string path = footage_in(c, folder);
@@ -145,7 +157,8 @@ class Render : public Verb {
     double seconds = 0;
     for (int frame = 0; frame < frames; ++frame) {
       const auto begin = std::chrono::steady_clock::now();
-      const Image image = renderer.render(frame);
+      const Image image = sensor_picture(renderer.exposed_levels(frame * pictures, pictures), frame,
+                                         c.render.noise, c.render.seed);
       seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       footage.add(image);
       if (frame == 0 || frame == frames / 2 || frame == frames - 1) {
@@ -171,6 +184,7 @@ class Render : public Verb {
   }
 
   bool keep_motion_ = false;
+  double exposure_ = 0;
   std::string clip_;
 };
 

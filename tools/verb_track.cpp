@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <sstream>
 
 #include "fitting/case.h"
@@ -60,6 +61,12 @@ class TrackVerb : public Verb {
         "--no-redetect", gives_up_,
         "leave points that were covered or lost alone; else they are looked for in later frames, and go on "
         "under their number where they are found and lead back to their start");
+    app.add_option(
+           "--exposure", exposure_,
+           "share of the frame interval that the shutter is open, whose blur is allowed for where skin moves "
+           "by more than a pixel meanwhile (default: found out from the blur; 0: not allowed for)")
+        ->option_text("FRACTION")
+        ->check(CLI::Range(0.0, 1.0));
     app.add_flag("--there-and-back", there_and_back_,
                  "also follow the points back from the last frame to the first and say how far from their "
                  "start they end: drift, in px; takes as long again");
@@ -77,12 +84,13 @@ class TrackVerb : public Verb {
     std::string folder = context.output_folder();
     TrackJob job;
     if (context.options.file.empty()) {
-      job = track_job(video_, asked({}));
+      job = track_job(video_, asked({}), exposure_);
     } else {
       const ChosenView chosen =
           chosen_view(fitting::load_case(context.options.file, context.options.settings), clip_, folder);
       folder = chosen.folder;
-      job = track_job(chosen.of_view, folder, video_, context.progress, asked(chosen.of_view.track));
+      job =
+          track_job(chosen.of_view, folder, video_, context.progress, asked(chosen.of_view.track), exposure_);
     }
     job.there_and_back = there_and_back_;
     if (frames_ > 0) job.footage.last = frames_ - 1;
@@ -117,6 +125,7 @@ class TrackVerb : public Verb {
 
   std::string video_, model_, clip_;
   std::vector<double> roi_;
+  std::optional<double> exposure_;
   int max_tracks_ = 0, frames_ = 0, window_ = 0;
   double min_distance_ = 0;
   bool there_and_back_ = false, gives_up_ = false;

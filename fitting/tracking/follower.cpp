@@ -168,6 +168,7 @@ void accept(const Measurement& m, const ResidualCorrelation& correlation, const 
     f->renewed = f->common.has_value();  // a template cut in the first frame is the first again
     f->template_gradient = f->warp.gradient * f->template_gradient;
     f->patch = m.new_patch;
+    f->has_first_template = false;
     f->baseline = 0;
   }
   f->residual = m.alignment.residual_rms;
@@ -181,7 +182,7 @@ void accept(const Measurement& m, const ResidualCorrelation& correlation, const 
       correlation.covariance(m.alignment, std::max(f->residual, view.least_residual));
   if (!f->common) f->common = 0.5 * both;
   f->with_itself.reset();
-  f->covariance = 0.5 * both;
+  f->covariance = 0.5 * both + m.misfit;
   f->active = true;
 }
 

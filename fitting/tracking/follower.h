@@ -21,6 +21,7 @@ struct Follower {
   /// Covariance of what all frames err alike: the noise of the first template as its alignments felt it, px².
   std::optional<Eigen::Matrix2d> common;
   std::optional<Alignment> with_itself;  ///< of the first template, until `common` is known
+  bool has_first_template = true;        ///< the template is of the first frame
   bool renewed = false;                  ///< the template is newer than the last recorded observation
   Eigen::Matrix2d template_gradient =
       Eigen::Matrix2d::Identity();                       ///< deformation from first frame to template
@@ -44,8 +45,9 @@ struct Measurement {
   Refusal refusal = Refusal::none;
   Alignment alignment;
   double forward_backward_px = 0;
-  bool from_previous = false;  ///< aligned with a template cut in the previous frame
-  PatchTemplate new_patch;     ///< that template
+  bool from_previous = false;                        ///< aligned with a template cut in the previous frame
+  PatchTemplate new_patch;                           ///< that template
+  Eigen::Matrix2d misfit = Eigen::Matrix2d::Zero();  ///< covariance that no residual shows, px²
 };
 
 /// Aligns with the chosen model, which has to end within `max_correction` px of `start` with at least

@@ -1,6 +1,8 @@
 #include "fitting/tracking/spline_image.h"
 
+#include <array>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "sim/core/error.h"
@@ -69,7 +71,42 @@ SplineImage::SplineImage(const cv::Mat& grey) {
   });
 }
 
+namespace {
+
+/// Weights of a line's points at whole pixels about its middle: each point by cubic interpolation, which keeps moments up to
+/// the third.
+cv::Mat line_kernel(const Vec2& line) {
+  const int reach = static_cast<int>(std::ceil(0.5 * line.cwiseAbs().maxCoeff())) + 2;
+  cv::Mat kernel = cv::Mat::zeros(2 * reach + 1, 2 * reach + 1, CV_32F);
+  const int points = 4 * static_cast<int>(std::ceil(line.norm())) + 4;
+  const auto weights = [](double t) -> std::array<double, 4> {  // at −1, 0, 1, 2
+    return {-t * (t - 1) * (t - 2) / 6, (t + 1) * (t - 1) * (t - 2) / 2, -(t + 1) * t * (t - 2) / 2,
+            (t + 1) * t * (t - 1) / 6};
+  };
+  for (int k = 0; k < points; ++k) {
+    const Vec2 at = ((k + 0.5) / points - 0.5) * line;
+    const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
+    const auto wx = weights(at.x() - x), wy = weights(at.y() - y);
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j)
+        kernel.at<float>(reach + y - 1 + j, reach + x - 1 + i) += static_cast<float>(wx[i] * wy[j] / points);
+  }
+  return kernel;
+}
+
+}  // namespace
+
+SplineImage SplineImage::averaged(const cv::Rect& area, const Vec2& line) const {
+  const cv::Rect inside = (area - origin_) & cv::Rect(0, 0, cols(), rows());
+  SplineImage part;
+  part.origin_ = origin_ + inside.tl();
+  // Of the coefficients, since both are convolutions; pixels beside the area count.
+  if (!inside.empty()) cv::filter2D(coefficients_(inside), part.coefficients_, CV_32F, line_kernel(line));
+  return part;
+}
+
 SplineImage::Sample SplineImage::sample(double x, double y) const {
+  x -= origin_.x, y -= origin_.y;
   const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
   double wx[4], dx[4], wy[4], dy[4];
   basis(x - i, wx, dx);

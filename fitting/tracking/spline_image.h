@@ -9,6 +9,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "sim/core/types.h"
+
 namespace rhytid::fitting {
 
 class SplineImage {
@@ -25,13 +27,21 @@ class SplineImage {
   Sample sample(double x, double y) const;
 
   /// All 16 coefficients around (x, y) exist.
-  bool contains(double x, double y) const { return x >= 1 && y >= 1 && x < cols() - 2 && y < rows() - 2; }
+  bool contains(double x, double y) const {
+    x -= origin_.x, y -= origin_.y;
+    return x >= 1 && y >= 1 && x < cols() - 2 && y < rows() - 2;
+  }
+
+  /// The part within `area`, each value the mean along a line about its place (length and direction in px; its moments
+  /// up to the third are exact). In the coordinates of the whole.
+  SplineImage averaged(const cv::Rect& area, const Vec2& line) const;
 
   int cols() const { return coefficients_.cols; }
   int rows() const { return coefficients_.rows; }
 
  private:
   cv::Mat coefficients_;  // CV_32F
+  cv::Point origin_;      // px of the first coefficient
 };
 
 }  // namespace rhytid::fitting

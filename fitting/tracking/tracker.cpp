@@ -7,6 +7,7 @@
 
 #include "fitting/tracking/follower.h"
 #include "fitting/tracking/jitter.h"
+#include "fitting/tracking/motion_blur.h"
 #include "fitting/tracking/optical_flow.h"
 #include "fitting/tracking/redetection.h"
 #include "sim/core/error.h"
@@ -134,6 +135,7 @@ class Run {
       }
     });
 
+    if (o_.exposure != 0.0) allow_for_blur(view, &measured);
     const double typical = typical_residual(measured);
     cv::parallel_for_(cv::Range(0, static_cast<int>(followers_.size())), [&](const cv::Range& range) {
       for (int i = range.start; i < range.end; ++i) {
@@ -178,6 +180,45 @@ class Run {
     for (const Measurement& m : measured)
       if (m.refusal == Refusal::none) residuals.push_back(m.alignment.residual_rms);
     return quantile(&residuals, 0.5);
+  }
+
+  /// Learns how long the shutter is open unless that is given, and measures accepted windows again that were blurred otherwise
+  /// than their templates.
+  void allow_for_blur(const FrameView& view, std::vector<Measurement>* measured) {
+    const int count = static_cast<int>(followers_.size());
+    const auto each = [count](const auto& work) {
+      cv::parallel_for_(cv::Range(0, count), [&work](const cv::Range& range) {
+        for (int i = range.start; i < range.end; ++i) work(i);
+      });
+    };
+    if (!o_.exposure && !shutter_.is_known()) {
+      // Every third window: their neighbours tell the same.
+      std::vector<std::optional<std::array<double, 5>>> costs(followers_.size());
+      each([&](int i) {
+        const Measurement& m = (*measured)[i];
+        if (i % 3 == 0 && m.refusal == Refusal::none)
+          costs[i] = Shutter::compare(followers_[i], m.alignment, view, o_);
+      });
+      for (const auto& c : costs)
+        if (c) shutter_.add(*c);
+    }
+    const double exposure = o_.exposure.value_or(shutter_.exposure());
+    if (exposure == 0) return;
+    each([&](int i) {
+      Measurement& m = (*measured)[i];
+      const Follower& f = followers_[i];
+      if (m.refusal != Refusal::none) return;
+      const PatchWarp start = m.alignment.warp;
+      const std::optional<Motions> motions = motions_of(f, start.centre);
+      if (!motions) return;
+      const RelativeBlur blur = relative_blur(motions->first, motions->now, start.gradient, exposure);
+      // A window smeared by more than half its side is too even to be told from others.
+      if (blur.longest() == 0 || blur.longest() > f.patch.half) return;
+      Measurement again = measure_blurred(f, start, blur, view, o_);
+      if (again.refusal != Refusal::none) return;
+      m.alignment = std::move(again.alignment);
+      m.misfit = blur_misfit(blur);
+    });
   }
 
   void refuse_strays(std::vector<Measurement>* measured) const {
@@ -262,6 +303,7 @@ class Run {
       if (fresh.values.empty()) continue;
       f.patch = std::move(fresh);
       f.renewed = true;
+      f.has_first_template = false;
       f.template_gradient = f.warp.gradient * f.template_gradient;
       f.warp.gradient.setIdentity();
       f.baseline = 0;
@@ -341,6 +383,9 @@ class Run {
                                       [](const Observation& o) { return o.status == TrackStatus::ok; });
       result.tracks.tracks.push_back(std::move(f.track));
     }
+    report_.exposure = o_.exposure.value_or(shutter_.exposure());
+    if (report_.exposure > 0)
+      for (Track& t : result.tracks.tracks) remove_acceleration(report_.exposure, &t);
     report_.jitter_px = measure_jitter(result.tracks);
     add_jitter(report_.jitter_px, &result.tracks);
     for (const Track& t : result.tracks.tracks) {
@@ -367,6 +412,7 @@ class Run {
   SplineImage first_, image_;  // of the first and of the last frame
   FlowPyramid pyramid_;
   ResidualCorrelation correlation_{{}};
+  Shutter shutter_;
   double least_residual_ = 0, typical_baseline_ = 0;
   int baseline_frame_ = -1;
   std::vector<double> all_errors_, all_residuals_;

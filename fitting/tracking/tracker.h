@@ -5,6 +5,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -78,6 +79,10 @@ struct TrackerOptions {
   double redetect_min_correlation = 0.8;
   double redetect_max_return_px = 0.5;  ///< from the seed, where what was found ends in the first frame
 
+  /// Share of the frame interval that the shutter is open, 0..1, whose blur is allowed for (motion_blur.h); 0 = it is not.
+  /// Nothing: found out from the residuals.
+  std::optional<double> exposure;
+
   /// Called after every frame; returning false stops the run (the report says interrupted).
   std::function<bool(const FrameCounts&, int frames_processed, int frames_asked)> progress;
 
@@ -106,6 +111,7 @@ struct TrackerReport {
   /// It judges the prediction in single frames and knows no drift (there_and_back.h does).
   double forward_backward_median_px = 0;
   double forward_backward_95_px = 0;
+  double exposure = 0;         ///< share of the frame interval, given or found; 0 where blur does not tell it
   double noise_grey = 0;       ///< per smoothed image: median residual / √2
   double jitter_px = 0;        ///< what tracks jump beside their neighbours (jitter.h); in the covariances
   double sigma_median_px = 0;  ///< of displacements since the first frame: median of sqrt(trace/2)

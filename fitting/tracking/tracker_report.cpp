@@ -35,6 +35,7 @@ void TrackerOptions::validate() const {
   check(o.redetect_search_px >= 1 && o.redetect_search_px <= 100, "redetect_search_px", o.redetect_search_px,
         "1 to 100 px");
   check(o.redetect_max_return_px > 0, "redetect_max_return_px", o.redetect_max_return_px, "above 0 px");
+  check(!o.exposure || (*o.exposure >= 0 && *o.exposure <= 1), "exposure", o.exposure.value_or(0), "0 to 1");
   check(!o.camera.empty() && o.camera.find_first_of(",\r\n") == std::string::npos, "camera", 0,
         "a name without commas");
 }
@@ -68,7 +69,13 @@ std::string summary(const TrackerReport& r) {
       r.frames_processed, r.frames_asked, to_string(r.end), r.started, r.kept, r.unbroken, r.redetected,
       r.forward_backward_median_px, r.forward_backward_95_px, r.noise_grey, r.jitter_px, r.sigma_median_px,
       r.template_updates);
-  return text;
+  std::string all = text;
+  if (r.exposure > 0) {
+    std::snprintf(text, sizeof text, "; blur of a shutter open for %.2f of the frame interval allowed for",
+                  r.exposure);
+    all += text;
+  }
+  return all;
 }
 
 }  // namespace rhytid::fitting

@@ -86,6 +86,8 @@ expect 2 1 '^rhytid: error: --window: got 20, expected an odd number of px from 
 expect 2 1 '^rhytid: error: --roi: got 0,0,0,0, expected' track case.json -o a --roi 0,0,0,0
 expect 2 1 '^rhytid: error: --roi: got 0,0,1e\+12,1e\+12, expected .* from 0 to 100000' track case.json -o a --roi 0,0,1e12,1e12
 expect 2 1 '^rhytid: error: --model' track case.json -o a --model rigid
+expect 2 1 '^rhytid: error: --exposure' track case.json -o a --exposure 1.5
+expect 2 1 '^rhytid: error: --exposure' render case.json -o a --exposure -0.5
 expect 2 1 '/track/roi: got \[0.0,0.0,0.0,5.0\], expected' track case.json -o a --set '/track/roi=[0, 0, 0, 5]'
 
 # The main job, tracking included.
@@ -120,6 +122,7 @@ expect 2 1 '^rhytid: error: j/footage.mp4: got no working encoder for h264, expe
 [ ! -e j ] || fail "a refused render left $(ls j)"
 mkdir j && cp a/{footage.avi,camera.yaml} j
 expect 0 0 'tracks.csv: 5 of 5 frames' track case.json -o j
+expect 0 0 'blur of a shutter open for 0.50 of the frame interval' track --video a/footage.avi --exposure 0.5 -o shutter
 unset OPENCV_VIDEOIO_PRIORITY_FFMPEG
 written j overlay.avi overlay.png
 

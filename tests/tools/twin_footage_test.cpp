@@ -326,6 +326,68 @@ TEST_F(TwinFootage, SameBitsForAnyNumberOfThreads) {
   EXPECT_NE(read_file(path("again/frame_0002.png")), read_file(path("out/frame_0002.png")));
 }
 
+/// Mean of sRGB grey levels of 255, in linear light.
+PictureLevels mean_light(const std::vector<PictureLevels>& pictures) {
+  PictureLevels mean = pictures[0];
+  for (size_t i = 0; i < mean.values.size(); ++i) {
+    double sum = 0;
+    for (const PictureLevels& p : pictures) {
+      const double v = p.values[i] / 255;
+      sum += v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+    }
+    sum /= static_cast<double>(pictures.size());
+    mean.values[i] = 255 * (sum <= 0.0031308 ? 12.92 * sum : 1.055 * std::pow(sum, 1 / 2.4) - 0.055);
+  }
+  return mean;
+}
+
+double rms_difference(const cv::Mat& bgr, const PictureLevels& levels) {
+  double sum = 0;
+  for (int y = 0; y < bgr.rows; ++y)
+    for (int x = 0; x < bgr.cols; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const double other = levels.values[3 * (static_cast<size_t>(y) * bgr.cols + x) + c];
+        sum += std::pow(bgr.at<cv::Vec3b>(y, x)[2 - c] - other, 2);
+      }
+  return std::sqrt(sum / (3. * bgr.rows * bgr.cols));
+}
+
+// The same truth filmed at 16 times the frame rate with a closed shutter: what an open one adds up.
+TEST_F(TwinFootage, OpenShuttersAddUpTheFramesOfAFasterCamera) {
+  const std::string truth =
+      R"(/truth/settings=["/skin/layers/skin/youngs_modulus=80 kPa", "/time/frame_rate=320 Hz", "/time/frames=96"])";
+  const auto film = [&](const std::string& folder, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"render", path("case.json"), "-o", path(folder), "--set", truth,
+                                          "--set",  "/render/noise=0"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+  };
+  const std::string slow = R"(/settings=["/time/frames=6"])";
+  film("fast", {"--set", R"(/settings=["/time/frame_rate=320 Hz", "/time/frames=96"])"});
+  film("closed", {"--set", slow});
+  film("open", {"--set", slow, "--exposure", "0.75"});
+
+  const MovingSurface surface = read_motion(path("fast/truth_motion.bin"));
+  ASSERT_EQ(surface.frames(), 97);
+  const fitting::Camera camera = fitting::read_camera(path("fast/camera.yaml"));
+  const SubdividedSurface tessellation(surface.mesh, SurfaceSide::outer, subdivision_for(surface, camera, 3));
+  const Scene scene = load_scene(path("scene.json"));
+  const SkinRenderer renderer(surface, tessellation, scene, camera,
+                              {.width = 160, .height = 120, .noise = 0, .texture_scale = 0.6});
+  std::vector<PictureLevels> pictures;
+  for (int f = 48 - 6; f <= 48 + 6; ++f) pictures.push_back(renderer.levels(f));
+  const PictureLevels mean = mean_light(pictures);
+  const double apart = rms_difference(cv::imread(path("open/frame_0003.png")), mean),
+               blur = rms_difference(cv::imread(path("closed/frame_0003.png")), mean);
+  std::printf("open shutter: %.2f grey from the mean of the frames meanwhile, a closed one %.2f\n", apart,
+              blur);
+  EXPECT_LT(apart, 0.4 * blur);  // 0.29 grey is the rounding of the picture
+  EXPECT_EQ(nlohmann::json::parse(read_file(path("open/truth.json")))["footage"]["exposure"], 0.75);
+  EXPECT_EQ(read_file(path("open/truth_tracks.csv")), read_file(path("closed/truth_tracks.csv")));
+  EXPECT_EQ(run({"render", path("case.json"), "-o", path("bad"), "--exposure", "1.5"}).code, 2);
+}
+
 TEST_F(TwinFootage, FinerTruthKeepsTheFitsFrameTimes) {
   const std::string settings = R"(/truth/settings=["/time/frame_rate=60 Hz", "/time/frames=6"])";
   const Outcome fine = run({"render", path("case.json"), "-o", path("fine"), "--set", settings});

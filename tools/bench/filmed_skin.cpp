@@ -17,8 +17,9 @@ struct Rolled {
 
 Rolled rolled(const HeadRoll& h, double t) {
   const double phase = 2 * pi * t / h.period, angle = h.turn * std::sin(phase);
-  return {h.shift_px * Vec2(std::sin(phase), 0.5 * std::sin(2 * phase)), std::cos(angle), std::sin(angle),
-          1 + h.zoom * std::sin(phase)};
+  const double pushed = h.swipe_px * (1 - std::cos(2 * pi * t / h.swipe_period)) / 2;
+  return {h.shift_px * Vec2(std::sin(phase), 0.5 * std::sin(2 * phase)) + pushed * Vec2(0.8, 0.6),
+          std::cos(angle), std::sin(angle), 1 + h.zoom * std::sin(phase)};
 }
 
 class PlaneSkin : public FilmedSkin {

@@ -17,11 +17,13 @@
 
 namespace rhytid::tools {
 
-/// How the head rolls in the picture: x ↦ c + s(t) + zoom(t) R(t) (x − c). It moves fastest at t = 0.
+/// How the head rolls in the picture: x ↦ c + s(t) + zoom(t) R(t) (x − c). It moves fastest at t = 0. Swipes push all of it forth
+/// and back from rest at t = 0, by swipe_px (1 − cos 2πt/swipe_period)/2 along (0.8, 0.6).
 struct HeadRoll {
   Vec2 centre = Vec2::Zero();
   double shift_px = 0, turn = 0, zoom = 0;  ///< amplitudes: px, rad, share
   double period = 20;                       ///< frames
+  double swipe_px = 0, swipe_period = 16;   ///< px, frames
   Vec2 forward(const Vec2& x, double t) const;
   Vec2 backward(const Vec2& x, double t) const;
 };

@@ -7,6 +7,7 @@
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
 #include "tools/bench/filmed_skin.h"
+#include "tools/render/exposure.h"
 #include "tools/render/scene_masks.h"
 #include "tools/render/skin_camera.h"
 #include "tools/render/surface_view.h"
@@ -18,23 +19,20 @@ namespace {
 constexpr int kParts = 8;               ///< pictures of a frame interval, kSubframes of filming.h
 constexpr double finger_margin_px = 4;  ///< as `rhytid track` has it
 
-/// The run with kParts frames for each of its own: in between a cubic through the four frames about it (Catmull and
-/// Rom), since a speed that jumps at a frame would make the mean over an exposure differ from its middle.
+/// The run with kParts frames for each of its own, and half a frame more at both ends: part k is at frame k/kParts − 1/2.
 MovingSurface parted(const MovingSurface& surface, int frames) {
   MovingSurface out{surface.mesh, {}, {}, surface.scene};
-  for (int k = 0; k < kParts * frames; ++k) {
-    const int f = k / kParts;
-    const double w = static_cast<double>(k % kParts) / kParts;
-    const auto at = [&](int i) { return static_cast<size_t>(std::clamp(i, 0, surface.frames() - 1)); };
-    const double w2 = w * w, w3 = w2 * w;
-    const double weights[4] = {(-w3 + 2 * w2 - w) / 2, (3 * w3 - 5 * w2 + 2) / 2, (-3 * w3 + 4 * w2 + w) / 2,
-                               (w3 - w2) / 2};
-    out.times.push_back((1 - w) * surface.times[at(f)] + w * surface.times[at(f + 1)]);
-    VectorXd sum = VectorXd::Zero(surface.displacements[0].size());
-    for (int i = 0; i < 4; ++i) sum += weights[i] * surface.displacements[at(f - 1 + i)];
-    out.displacements.push_back(std::move(sum));
+  for (int k = 0; k <= kParts * frames; ++k) {
+    const double at = static_cast<double>(k) / kParts - 0.5;
+    out.times.push_back(time_between(surface, at));
+    out.displacements.push_back(displacement_between(surface, at));
   }
   return out;
+}
+
+/// The part at the time t, frames.
+int part_at(double t) {
+  return static_cast<int>(std::lround((t + 0.5) * kParts));
 }
 
 class TwinSkin : public FilmedSkin {
@@ -47,13 +45,13 @@ class TwinSkin : public FilmedSkin {
                                  : fitting::read_case_camera(c)),
         tessellation_(surface_.mesh, SurfaceSide::outer, subdivision_for(surface_, camera_, 3)),
         renderer_(surface_, tessellation_, scene_, camera_, c.render),
-        at_rest_(surface_, tessellation_, camera_, 0) {}
+        at_rest_(surface_, tessellation_, camera_, part_at(0)) {}
 
   cv::Size size() const override { return {camera_.width, camera_.height}; }
   int frames() const override { return frames_; }
 
   cv::Mat light(double t, const HeadRoll& head) const override {
-    const int part = std::clamp(static_cast<int>(std::lround(t * kParts)), 0, surface_.frames() - 1);
+    const int part = std::clamp(part_at(t), 0, surface_.frames() - 1);
     const auto [place, is_new] = drawn_.try_emplace(part);
     if (is_new) place->second = draw(part);
     cv::Mat out(size(), CV_32F);
@@ -72,7 +70,7 @@ class TwinSkin : public FilmedSkin {
     const auto point = at_rest_.pick(head.backward(first, 0));
     std::vector<Vec2> list;
     for (int f = 0; point && f < frames_; ++f)
-      list.push_back(head.forward(camera_.project(surface_.position(*point, f * kParts)), f));
+      list.push_back(head.forward(camera_.project(surface_.position(*point, part_at(f))), f));
     return list;
   }
 
@@ -80,7 +78,7 @@ class TwinSkin : public FilmedSkin {
     o->seeds.region_mask = patch_mask(surface_, camera_, o->window_px / 2);
     const Vec3 direction = finger_direction(surface_.mean_normal(), camera_);
     o->mask = [this, direction, head](const fitting::Frame& frame) {
-      const cv::Mat still = finger_mask(scene_, surface_.times[static_cast<size_t>(frame.index) * kParts],
+      const cv::Mat still = finger_mask(scene_, surface_.times[static_cast<size_t>(part_at(frame.index))],
                                         direction, camera_, finger_margin_px);
       cv::Mat moved(still.size(), CV_8U);
       for (int y = 0; y < moved.rows; ++y)

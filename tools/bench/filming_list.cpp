@@ -82,6 +82,15 @@ std::vector<Filming> all_filmings() {
          .exposure = e,
          .head = roll(16)});
   }
+  for (const double e : {0.0, 0.25, 0.5, 1.0}) {
+    char name[32];
+    std::snprintf(name, sizeof(name), e == 0 ? "swipe" : "swipe_open_%.2g", e);
+    add({.name = name,
+         .description = e == 0 ? "all is pushed 40 px forth and back from rest, 8 px a frame at most"
+                               : "the same, shutter open for that share of the frame interval",
+         .exposure = e,
+         .head = {.swipe_px = 40}});
+  }
   add({.name = "open_1", .description = "the head is still, shutter open all the time", .exposure = 1});
   add({.name = "disc_masked",
        .description = "a disc passes, its mask is given",

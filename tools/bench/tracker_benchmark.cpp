@@ -157,6 +157,10 @@ class TrackerBenchmark : public Benchmark {
     app.add_option("--frames", frames_, "of each film (default 16)")->check(CLI::Range(3, 1000));
     app.add_option("--window", window_, "side of the tracker's window, px (default 21)")
         ->check(CLI::Range(7, 201));
+    app.add_option("--exposure", exposure_,
+                   "track with --exposure FRACTION (default: found out from the blur)")
+        ->option_text("FRACTION")
+        ->check(CLI::Range(0.0, 1.0));
     app.add_option("--seed", seed_, "of texture and noise (default 1)");
   }
 
@@ -172,6 +176,7 @@ class TrackerBenchmark : public Benchmark {
       for (const Filming& filming : wanted) {
         fitting::TrackerOptions options;
         options.window_px = window_;
+        options.exposure = exposure_;
         options.seeds.min_distance_px = 10;
         options.seeds.max_tracks = 120;
         scores.push_back(score_filming(*s.skin, filming, options, seed_, folder));
@@ -247,6 +252,7 @@ class TrackerBenchmark : public Benchmark {
   std::vector<int> region_;
   int picture_frame_ = 0, frames_ = 16, window_ = 21;
   unsigned seed_ = 1;
+  std::optional<double> exposure_;
 };
 
 }  // namespace

@@ -114,7 +114,7 @@ SkinRenderer::SkinRenderer(const MovingSurface& surface, const SubdividedSurface
   across = (across - across.dot(up_) * up_).normalized();
   const double elevation = 40 * std::numbers::pi / 180;
   if (options.finger_dots > 0)
-    for (const Finger& finger : fingers_at(scene, surface.times.front(), finger_direction_))
+    for (const Finger& finger : fingers_at(scene, 0, finger_direction_))
       dots_.push_back(finger_dots(finger, camera, options.finger_dots));
   light_ = std::cos(elevation) * across + std::sin(elevation) * up_;
   if (!has_distortion(camera)) return;
@@ -243,6 +243,21 @@ Image SkinRenderer::render(int frame) const {
 }
 
 PictureLevels SkinRenderer::levels(int frame) const {
+  return exposed_levels(frame, 1);
+}
+
+PictureLevels SkinRenderer::exposed_levels(int first, int count) const {
+  require(count >= 1, "SkinRenderer: no frame");
+  std::vector<double> sum = light(first);
+  for (int k = 1; k < count; ++k) {
+    const std::vector<double> other = light(first + k);
+    for (size_t i = 0; i < sum.size(); ++i) sum[i] += other[i];
+  }
+  for (double& value : sum) value = srgb_level(value / count);
+  return {camera_.width, camera_.height, std::move(sum)};
+}
+
+std::vector<double> SkinRenderer::light(int frame) const {
   require(frame >= 0 && frame < surface_.frames(), "SkinRenderer: frame out of range");
   const VectorXd& u = surface_.displacements[static_cast<size_t>(frame)];
   Lit lit;
@@ -263,8 +278,7 @@ PictureLevels SkinRenderer::levels(int frame) const {
   lit.buffer = visibility(lit.positions);
 
   const int n = options_.supersampling;
-  PictureLevels picture{camera_.width, camera_.height, {}};
-  picture.values.resize(3 * static_cast<size_t>(camera_.width) * static_cast<size_t>(camera_.height));
+  std::vector<double> picture(3 * static_cast<size_t>(camera_.width) * static_cast<size_t>(camera_.height));
   parallel_for(camera_.height, [&](std::int64_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < camera_.width; ++x) {
@@ -272,8 +286,8 @@ PictureLevels SkinRenderer::levels(int frame) const {
       for (int sy = y * n; sy < (y + 1) * n; ++sy)
         for (int sx = x * n; sx < (x + 1) * n; ++sx)
           sum += sample(lit, lit.buffer.index(sx, sy), lit.buffer.position(sx, sy));
-      double* pixel = &picture.values[3 * static_cast<size_t>(row * camera_.width + x)];
-      for (int c = 0; c < 3; ++c) pixel[c] = srgb_level(sum[c] / (n * n));
+      double* pixel = &picture[3 * static_cast<size_t>(row * camera_.width + x)];
+      for (int c = 0; c < 3; ++c) pixel[c] = sum[c] / (n * n);
     }
   });
   return picture;

@@ -1,7 +1,7 @@
 // Footage of a moving skin: textured, lit from the side, with the finger, its shadow, and camera noise.
 //
 //   colour = albedo · (ambient · occlusion + key · shadow · wrapped cosine) + a weak gloss,
-// summed in linear light over the samples of a pixel, encoded as sRGB, then noise of the given deviation in
+// summed in linear light over the samples of a pixel and over the pictures of an exposure (exposure.h), encoded as sRGB, then noise of the given deviation in
 // grey levels. Everything random is a hash of seed, frame and place, so that a frame is the same bits
 // whatever the number of threads.
 #pragma once
@@ -42,9 +42,13 @@ class SkinRenderer {
   Image render(int frame) const;
   /// The same before the sensor, so that a frame is drawn once for many draws of noise.
   PictureLevels levels(int frame) const;
+  /// The mean light of `count` frames of the surface from `first` on, as an open shutter adds it up (exposure.h).
+  PictureLevels exposed_levels(int first, int count) const;
 
  private:
   struct Lit;
+  /// Linear light of a frame, 1 = white; may be more. [height · width · 3]
+  std::vector<double> light(int frame) const;
   VisibilityBuffer visibility(const MatrixX3& positions) const;
   Vec3 sample(const Lit& lit, size_t index, const Vec2& pixel) const;
   Vec3 skin_colour(const Lit& lit, size_t index) const;

@@ -33,6 +33,7 @@ json track_record(const fitting::TrackerReport& report, const std::optional<fitt
       {"redetected", report.redetected},
       {"forward_backward_px",
        {{"median", report.forward_backward_median_px}, {"p95", report.forward_backward_95_px}}},
+      {"exposure", report.exposure},
       {"noise_grey", report.noise_grey},
       {"jitter_px", report.jitter_px},
       {"sigma_median_px", report.sigma_median_px},
