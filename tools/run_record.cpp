@@ -35,6 +35,8 @@ ordered_json schemes(const Scene& scene) {
   });
   if (!rubs)
     j["friction"] = "none";
+  else if (scene.time.lag == FrictionLag::extrapolated)
+    j["friction"] = "normal force and tangent plane extrapolated from the two previous converged steps";
   else if (passes == 1)
     j["friction"] = "normal force and tangent plane lagged from the previous converged step";
   else

@@ -194,6 +194,7 @@ void fields(Archive& archive, T& time) {
   archive("frame_rate", time.frame_rate);
   archive("frames", time.frames);
   archive("substeps", time.substeps);
+  archive("lag", time.lag);
   archive("lag_passes", time.lag_passes);
   archive("max_bisections", time.max_bisections);
   archive("damper", time.damper);

@@ -20,6 +20,10 @@ struct EnumNames<DamperScheme> {
                                                          "none"};
 };
 template <>
+struct EnumNames<FrictionLag> {
+  static constexpr std::array<std::string_view, 2> words{"previous", "extrapolated"};
+};
+template <>
 struct EnumNames<RimCondition> {
   static constexpr std::array<std::string_view, 3> words{"clamped", "sliding", "free"};
 };

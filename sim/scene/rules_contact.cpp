@@ -224,6 +224,14 @@ std::vector<Rule> run_rules() {
        .min = 1,
        .max = 10000,
        .doc = "Implicit steps per frame."},
+      {.pointer = "/time/lag",
+       .type = option,
+       .fallback = to_string(time.lag),
+       .options = enum_words<FrictionLag>(),
+       .doc =
+           "Friction's normal force and direction: those where the step before ended (previous), or these "
+           "carried on to the end of the step at the rates of the step before (extrapolated; lag_passes is 1 "
+           "then)."},
       {.pointer = "/time/lag_passes",
        .type = integer,
        .fallback = time.lag_passes,

@@ -124,11 +124,16 @@ struct ColliderScene {
   std::vector<PathKnot> path;
 };
 
+/// What the friction of a step takes its pressure and direction from: those where the step before ended, or these
+/// extrapolated by their change over that step.
+enum class FrictionLag { previous, extrapolated };
+
 struct TimeScene {
   double frame_rate = 24;  ///< 1/s
   int frames = 0;          ///< frames after the rest frame 0
   int substeps = 1;        ///< per frame
-  int lag_passes = 1;      ///< solves per step over the lag of friction
+  FrictionLag lag = FrictionLag::previous;
+  int lag_passes = 1;  ///< solves per step over the lag of friction; 1 with an extrapolated one
   int max_bisections = 4;
   DamperScheme damper = DamperScheme::exponential;
   double offset = 0;  ///< s by which the clock of all paths runs ahead of the frames

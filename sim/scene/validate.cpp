@@ -5,6 +5,7 @@
 #include <set>
 
 #include "sim/core/error.h"
+#include "sim/scene/names.h"
 #include "sim/scene/nearest.h"
 #include "sim/scene/rules.h"
 
@@ -313,6 +314,14 @@ void require_semi_axes(const LocatedJson& scene, const json& semi_axes, const st
                      "three lengths > 0 mm, the longest at most 1000 times the shortest");
 }
 
+/// A pass has the lag of the pass before, so that there is nothing to extrapolate.
+void check_lag(const LocatedJson& scene) {
+  const json& time = scene.json["time"];
+  if (time["lag"] != to_string(FrictionLag::extrapolated) || time["lag_passes"] == 1) return;
+  throw InputError(scene.where("/time/lag_passes") + ": /time/lag_passes", shown_json(time["lag_passes"]),
+                   "1, since /time/lag is extrapolated: later passes would have a lag of their own");
+}
+
 }  // namespace
 
 LocatedJson resolve_against_rules(const LocatedJson& scene, const RuleNode& rules) {
@@ -331,6 +340,7 @@ void check_consistency(const LocatedJson& scene) {
   check_skin(scene);
   check_held(scene);
   check_subdivision(scene);
+  check_lag(scene);
   if (root.contains("base")) {
     const json& base = root["base"];
     require_direction(scene, base, "/base", "normal");

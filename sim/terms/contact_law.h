@@ -5,7 +5,7 @@
 //   friction  Ψ = μ f_n D(|u_T|; ε_v dt), u_T = (I − n nᵀ)(x − x_b), x_b = c + R R_oldᵀ (x_old − c_old):
 //   where
 //             the body, moving and turning, has carried the place that x lay on; f_n, n from the last
-//             converged step or pass (sim/time/simulate.h)
+//             converged step or pass (sim/time/simulate.h), or extrapolated (extrapolated_friction_law.h)
 //             quintic   D = δ⁶/ε⁵ − 3δ⁵/ε⁴ + 5δ⁴/(2ε³) | δ − ε/2
 //             quadratic D = δ²/ε − δ³/(3ε²) | δ − ε/3   (IPC)
 //
@@ -233,24 +233,34 @@ struct SizedFrictionLaw {
     return energy;
   }
 
-  /// The lag of the next step: contact pressure −∂Ψ/∂g and unit normal at the converged position.
+  /// Contact pressure −∂Ψ/∂g (left alone where the point does not touch) and unit normal, into lag [4]. False, and
+  /// nothing written, where the gap has no gradient: at the centre of a sphere, which has no friction hence.
+  template <class T>
+  bool lag_of(const LiftedGap<T>& g, const T* theta, const double* rest, T* lag) const {
+    using std::sqrt;
+    const T length =
+        sqrt(g.gradient[0] * g.gradient[0] + g.gradient[1] * g.gradient[1] + g.gradient[2] * g.gradient[2]);
+    if (!(value_of(length) > 0)) return false;
+    const T depth = theta[1] + rest[3] - g.gap;
+    if (value_of(depth) > 0) {
+      T slope;
+      (void)ContactLaw::penalty(theta[0], depth, onset, slope);
+      lag[0] = slope * length;
+    }
+    for (int i = 0; i < 3; ++i) lag[1 + i] = g.gradient[i] / length;
+    return true;
+  }
+
+  /// The lag of the next step: pressure and unit normal at the converged position.
   template <class T>
   void update(const T* u, const T*, const T* theta, const double* rest, double, T* lag) const {
-    using std::sqrt;
     for (int i = 0; i < 4; ++i) lag[i] = T(i == 3 ? 1.0 : 0.0);
     const GapAt at = gap_at<sizes>(*shape, u, rest, theta + 3, theta + 9, theta + 17);
     if (!touches(at, value_of(theta[1]), rest[3])) return;
-    const LiftedGap<T> g = lift_gap<sizes>(at, u, rest, theta + 3, theta + 9, theta + 17);
-    const T depth = theta[1] + rest[3] - g.gap;
-    T slope;
-    (void)ContactLaw::penalty(theta[0], depth, onset, slope);
-    const T length =
-        sqrt(g.gradient[0] * g.gradient[0] + g.gradient[1] * g.gradient[1] + g.gradient[2] * g.gradient[2]);
-    if (!(value_of(length) > 0)) return;  // the centre of a sphere: no direction, hence no friction
-    lag[0] = slope * length;
-    for (int i = 0; i < 3; ++i) lag[1 + i] = g.gradient[i] / length;
+    (void)lag_of(lift_gap<sizes>(at, u, rest, theta + 3, theta + 9, theta + 17), theta, rest, lag);
   }
 
+  /// So that a step may be solved again with its own (sim/time/step_passes.h).
   static constexpr bool history_is_lag = true;
   static constexpr std::array<const char*, 0> stored_names{};
   template <class T>

@@ -65,5 +65,8 @@ const KernelTable& friction_kernels();
 /// The same for EllipsoidContactLaw and EllipsoidFrictionLaw.
 const KernelTable& ellipsoid_contact_kernels();
 const KernelTable& ellipsoid_friction_kernels();
+/// The same for ExtrapolatedFrictionLaw and ExtrapolatedEllipsoidFrictionLaw.
+const KernelTable& extrapolated_friction_kernels();
+const KernelTable& extrapolated_ellipsoid_friction_kernels();
 
 }  // namespace rhytid

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "sim/terms/contact_law.h"
+#include "sim/terms/extrapolated_friction_law.h"
 #include "sim/terms/kernel_choice.h"
 #include "sim/terms/ligament_law.h"
 #include "sim/terms/make_kernel_table.h"
@@ -115,6 +116,15 @@ const KernelTable& ellipsoid_contact_kernels() {
 }
 const KernelTable& ellipsoid_friction_kernels() {
   static constexpr KernelTable table = kernel_table<EllipsoidFrictionLaw, SurfaceKinematics>();
+  return table;
+}
+
+const KernelTable& extrapolated_friction_kernels() {
+  static constexpr KernelTable table = kernel_table<ExtrapolatedFrictionLaw, SurfaceKinematics>();
+  return table;
+}
+const KernelTable& extrapolated_ellipsoid_friction_kernels() {
+  static constexpr KernelTable table = kernel_table<ExtrapolatedEllipsoidFrictionLaw, SurfaceKinematics>();
   return table;
 }
 

@@ -54,9 +54,7 @@ constexpr KernelTable kernel_table() {
     };
   table.num_stored = static_cast<int>(K::stored_names.size());
   table.stored_names = K::stored_names.data();
-  table.history_is_lag = requires {
-    Law::history_is_lag;
-  };
+  if constexpr (requires { Law::history_is_lag; }) table.history_is_lag = Law::history_is_lag;
   if constexpr (K::has_regimes) {
     table.regime = [](const void* l, const ElementView& v, const double* u, const double* p,
                       signed char* out) { K::regime(*static_cast<const Law*>(l), v, u, p, out); };

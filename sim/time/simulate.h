@@ -20,7 +20,7 @@ struct RunOptions {
   /// fully relaxed. Needed when the rest shape is under tension (pre-stretch) or held parts are displaced at
   /// time 0 already. It is not taken when frames_done > 0.
   bool settle = false;
-  int lag_passes = 1;      ///< solves per step over the lag of friction (step_passes.h)
+  int lag_passes = 1;      ///< solves per step over what terms have for a lag (step_passes.h)
   int max_bisections = 4;  ///< a step that fails is halved at most this often
   MinimiserOptions minimiser;
   bool keep_states = true;  ///< keep every step's state in the trajectory (needed for gradients)

@@ -5,8 +5,8 @@
 
 namespace rhytid {
 
-/// State after a converged step: displacement and per-point histories (C^v − I of skin, lagged pressure and
-/// normal of friction), the slices of the terms one after the other in the model's order.
+/// State after a converged step: displacement and per-point histories (C^v − I of skin, the lag of friction
+/// and, extrapolated, its rates), the slices of the terms one after the other in the model's order.
 struct State {
   double time = 0;   ///< s
   VectorXd u;        ///< [num_nodes·3] displacement, mm

@@ -201,6 +201,7 @@ INSTANTIATE_TEST_SUITE_P(
     Checkpoints, DroppedHistories,
     testing::Values(std::vector<std::string>{"/time/damper=exponential"},
                     std::vector<std::string>{"/time/damper=literal", "/time/lag_passes=3", "/time/frames=5"},
+                    std::vector<std::string>{"/time/damper=exponential", "/time/lag=extrapolated"},
                     std::vector<std::string>{"/skin/pre_stretch={\"stretch\":1.1}", "/time/frames=6"}));
 
 // Of a run without histories the certificate is that of the run with them.

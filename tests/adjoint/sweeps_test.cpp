@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "adjoint/resimulate.h"
 #include "sim/core/parallel.h"
 #include "sim/time/step_passes.h"
 #include "tests/adjoint/gradient_checks.h"
@@ -55,6 +56,14 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"/time/lag_passes=2"},
         std::vector<std::string>{"/time/lag_passes=4", "/time/frames=5",
                                  "/colliders/finger/friction/mollifier=quadratic"},
+        // Friction whose normal force and direction are extrapolated.
+        std::vector<std::string>{"/time/lag=extrapolated"},
+        std::vector<std::string>{"/time/lag=extrapolated", "/time/substeps=2", "/time/frames=5",
+                                 "/skin/pre_stretch={\"stretch\":1.1}",
+                                 "/colliders/finger/friction/mollifier=quadratic"},
+        std::vector<std::string>{"/time/lag=extrapolated", "/colliders/finger/shape=ellipsoid",
+                                 "/colliders/finger/semi_axes=[7,4,5]",
+                                 "/colliders/finger/path/2/rotation=[0,-0.3,0.5]"},
         // A side of the rim that is moved while the finger drags.
         std::vector<std::string>{
             "/skin/held=[{\"name\":\"side\",\"box\":{\"low\":[-8,-6,0],\"high\":[-8,6,0]},"
@@ -62,6 +71,73 @@ INSTANTIATE_TEST_SUITE_P(
             "{\"time\":0.5,\"displacement\":[0.7,0.3,0.1]}]}]"},
         // One layer relaxes, the other does not: two skin terms.
         std::vector<std::string>{"/skin/layers/film/relaxing_fraction=0", "/skin/rim=free"}));
+
+/// Slopes of the Taylor remainder along each of some parameters by itself, in a run where the finger slides.
+void expect_slopes_of_two(const CertifiedCase& c, const std::vector<std::string>& addresses) {
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  const AdjointResult adjoint = adjoint_sweep(c.model(), c.scene_model.native(), c.run, *c.output, c.weights);
+  const FunctionalDifference functional(c.scene_model, c.run, *c.output, c.weights,
+                                        certificate_minimiser({}));
+  const ParameterSpace all(c.scene_model, addresses);
+  EXPECT_LT(duality(c, *c.output, c.weights, all.jacobian(), adjoint), 1e-12);
+  for (const std::string& address : addresses) {
+    SCOPED_TRACE(address);
+    const ParameterSpace space(c.scene_model, {address});
+    const VectorXd gradient = space.jacobian().transpose() * adjoint.native_bar, one = VectorXd::Ones(1);
+    const double noise = measure_noise(functional, space, one);
+    const TaylorSeries s = taylor_test(functional, space, one, gradient, noise, {});
+    ASSERT_FALSE(s.slopes.empty()) << s.sentence;
+    std::printf("%s: slope %.4f, %s\n", address.c_str(), s.slopes.back(), s.sentence.c_str());
+    EXPECT_TRUE(s.passed) << s.sentence;
+    EXPECT_GT(s.slopes.back(), 1.95);
+    EXPECT_LT(s.slopes.back(), 2.05);
+  }
+}
+
+const std::vector<std::string> kOfASlidingFinger = {
+    "/colliders/finger/friction/coefficient", "/colliders/finger/path/2/position/0",
+    "/colliders/finger/path/1/position/2", "/skin/layers/soft/youngs_modulus",
+    "/skin/layers/film/youngs_modulus"};
+
+TEST(Sweeps, ExtrapolatedLagHasTheSlopesOfEachParameter) {
+  const CertifiedCase c(test::drag_scene(2, 10), settings({"/time/lag=extrapolated", "/time/offset=0.01"}));
+  long slipping = 0;
+  for (std::size_t t = 0; t < c.model().terms.size(); ++t) {
+    if (c.model().terms[t].name() != "friction finger") continue;
+    StepPasses passes(c.model(), c.scene_model.native(), c.run.steps.back().step, c.run.before(9), {});
+    for (const signed char piece :
+         c.model().terms[t].regimes(passes.last().step(), passes.last().data(t), c.run.steps.back().state.u))
+      slipping += piece == 2;
+  }
+  EXPECT_GT(slipping, 10) << "does it slide?";
+  expect_slopes_of_two(c, kOfASlidingFinger);
+}
+
+/// The middle steps of a run halved, so that a step is half as long as the one before it, and one twice as long.
+TEST(Sweeps, ExtrapolatedLagOverHalvedSteps) {
+  CertifiedCase c(test::drag_scene(2, 6), settings({"/time/lag=extrapolated", "/time/offset=0.01"}));
+  ASSERT_TRUE(c.run.complete) << c.run.failure;
+  Trajectory halved = c.run;
+  halved.steps.clear();
+  halved.frame_end = {0};
+  for (int i = 0; i < 6; ++i) {
+    const StepRecord& whole = c.run.steps[static_cast<std::size_t>(i)];
+    std::vector<double> times = {whole.step.t_old, whole.step.t};
+    if (i == 3 || i == 4) times.insert(times.begin() + 1, 0.5 * (whole.step.t_old + whole.step.t));
+    for (std::size_t k = 0; k + 1 < times.size(); ++k) {
+      StepRecord part = whole;
+      part.step = {static_cast<int>(halved.steps.size()), times[k], times[k + 1]};
+      part.bisections = times.size() > 2 ? 1 : 0;
+      halved.steps.push_back(std::move(part));
+    }
+    halved.frame_end.push_back(static_cast<int>(halved.steps.size()));
+  }
+  c.run = resimulate(c.model(), c.scene_model.native(), halved, c.options.minimiser, {}, {}, true);
+  ASSERT_EQ(c.run.steps.size(), 8u);
+  EXPECT_NEAR(c.run.steps[3].step.dt() / c.run.steps[2].step.dt(), 0.5, 1e-12);
+  EXPECT_NEAR(c.run.steps[7].step.dt() / c.run.steps[6].step.dt(), 2, 1e-12);
+  expect_slopes_of_two(c, {kOfASlidingFinger[0], kOfASlidingFinger[1], kOfASlidingFinger[3]});
+}
 
 TEST(Sweeps, ElasticSceneHasNoHistory) {
   const CertifiedCase c(test::drag_scene(2, 4), settings({"/skin/layers/soft/relaxing_fraction=0",

@@ -150,11 +150,12 @@ struct DragEnd {
   double pass_change = 0;
 };
 
-DragEnd drag_end(int substeps, int passes) {
-  const SceneModel m(parse_scene_text(
-      drag_scene(2, 8), "drag.json",
-      {"/skin/surface/grid/cells=[4,3]", "/skin/layers/soft/order=1", "/colliders/finger/path/1/time=0.0625",
-       "/time/substeps=" + std::to_string(substeps), "/time/lag_passes=" + std::to_string(passes)}));
+DragEnd drag_end(int substeps, int passes, const std::vector<std::string>& more = {}) {
+  std::vector<std::string> settings = {
+      "/skin/surface/grid/cells=[4,3]", "/skin/layers/soft/order=1", "/colliders/finger/path/1/time=0.0625",
+      "/time/substeps=" + std::to_string(substeps), "/time/lag_passes=" + std::to_string(passes)};
+  settings.insert(settings.end(), more.begin(), more.end());
+  const SceneModel m(parse_scene_text(drag_scene(2, 8), "drag.json", settings));
   const Trajectory run = simulate(m.model(), m.native(), m.run_options());
   EXPECT_TRUE(run.complete) << run.failure;
   DragEnd end{run.at_frame(8).u};
@@ -188,6 +189,50 @@ TEST(Friction, PassesConvergeToTheImplicitLaw) {
   }
   EXPECT_LT(to_implicit[1][0], 0.8 * to_implicit[0][0]) << "the lag is of first order in dt";
   EXPECT_LT(to_implicit[1][1], 0.6 * to_implicit[0][1]);
+}
+
+/// Errors of the last frame against steps so fine that the lag no longer matters, of the largest displacement: one
+/// pass, two, one with an extrapolated lag.
+struct LagErrors {
+  double previous, two_passes, extrapolated;
+};
+
+std::vector<LagErrors> errors_in_time(const std::vector<int>& substeps, std::vector<std::string> settings) {
+  const auto end = [&](int steps, int passes, const char* lag) {
+    std::vector<std::string> all = settings;
+    all.emplace_back(std::string("/time/lag=") + lag);
+    return drag_end(steps, passes, all).u;
+  };
+  const VectorXd fine = end(64, 1, "extrapolated");
+  const double size = fine.lpNorm<Eigen::Infinity>();
+  const auto error = [&](const VectorXd& u) { return (u - fine).lpNorm<Eigen::Infinity>() / size; };
+  EXPECT_LT(error(end(64, 2, "previous")), 3e-4) << "both lags have one limit";
+  std::vector<LagErrors> errors;
+  for (const int n : substeps) {
+    errors.push_back(
+        {error(end(n, 1, "previous")), error(end(n, 2, "previous")), error(end(n, 1, "extrapolated"))});
+    std::printf("  %d substeps: %.2e (previous) %.2e (2 passes) %.2e (extrapolated) of %.3f mm\n", n,
+                errors.back().previous, errors.back().two_passes, errors.back().extrapolated, size);
+  }
+  return errors;
+}
+
+// A free patch that a finger on a smooth path takes along.
+TEST(Friction, ExtrapolatedLagBringsSmallerErrorsInTime) {
+  const auto errors = errors_in_time({2, 4, 8}, {"/skin/rim=free", "/colliders/finger/interpolation=spline"});
+  for (const LagErrors& e : errors) {
+    EXPECT_LT(e.extrapolated, 0.4 * e.previous);
+    EXPECT_LT(e.extrapolated, e.two_passes) << "at half the solves";
+  }
+  EXPECT_LT(errors[2].extrapolated, 0.3 * errors[0].extrapolated);
+}
+
+// A finger that presses, then slides off at once: the pressure that was about to grow does not. Coarse steps are no
+// better then, fine ones are.
+TEST(Friction, ExtrapolatedLagOvershootsWhereAPathHasAKink) {
+  const auto errors = errors_in_time({2, 16}, {});
+  EXPECT_GT(errors[0].extrapolated, 0.8 * errors[0].previous);
+  EXPECT_LT(errors[1].extrapolated, 0.5 * errors[1].previous);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include "sim/core/error.h"
 #include "sim/scene/collider_motion.h"
 #include "sim/surface/shapes.h"
-#include "sim/terms/contact_law.h"
+#include "sim/terms/extrapolated_friction_law.h"
 #include "sim/terms/geometry.h"
 
 namespace rhytid {
@@ -35,14 +35,21 @@ Term contact_term(const ColliderScene& c, const ImplicitShape* shape) {
   return {name, contact_kernels(), ContactLaw{shape, c.onset}};
 }
 
-Term friction_term(const ColliderScene& c, const ImplicitShape* shape) {
+Term friction_term(const ColliderScene& c, FrictionLag lag, const ImplicitShape* shape) {
   const std::string name = "friction " + c.name;
   const double speed = c.friction->slip_speed;
   const Mollifier mollifier =
       c.friction->mollifier == "quadratic" ? Mollifier::quadratic : Mollifier::quintic;
-  if (num_sizes(c) > 0)
-    return {name, ellipsoid_friction_kernels(), EllipsoidFrictionLaw{shape, c.onset, speed, mollifier}};
-  return {name, friction_kernels(), FrictionLaw{shape, c.onset, speed, mollifier}};
+  const bool extrapolates = lag == FrictionLag::extrapolated;
+  if (num_sizes(c) > 0) {
+    const EllipsoidFrictionLaw law{shape, c.onset, speed, mollifier};
+    if (extrapolates)
+      return {name, extrapolated_ellipsoid_friction_kernels(), ExtrapolatedEllipsoidFrictionLaw{law}};
+    return {name, ellipsoid_friction_kernels(), law};
+  }
+  const FrictionLaw law{shape, c.onset, speed, mollifier};
+  if (extrapolates) return {name, extrapolated_friction_kernels(), ExtrapolatedFrictionLaw{law}};
+  return {name, friction_kernels(), law};
 }
 
 /// Slots of the centre now or at the start of the step; `offset` is the collider's native block.
@@ -105,8 +112,10 @@ void ColliderPart::add_terms(const Scene& scene, Model& model, std::vector<Featu
     }
     if (has_friction(c)) {
       friction.present = true;
-      friction.detail = "lagged pressure and normal at every contact point";
-      Term term = friction_term(c, shape);
+      friction.detail = scene.time.lag == FrictionLag::extrapolated
+                            ? "extrapolated pressure and normal at every contact point"
+                            : "lagged pressure and normal at every contact point";
+      Term term = friction_term(c, scene.time.lag, shape);
       TermGroup g = surface_group(model.mesh, SkinSide::outer, rule);
       g.theta = {constant_slot(base), constant_slot(base + 1), constant_slot(base + 2)};
       for (const ThetaSlot::Kind kind : {path_now, path_old}) add_centre_slots(motion, kind, base, g);

@@ -154,6 +154,25 @@ TEST(SceneErrors, EmptyAndForeignTexts) {
   EXPECT_THAT(error_of("{\"" + std::string(100000, 'x') + "\": 1}"), StartsWith("a.json:1: /xxx"));
 }
 
+TEST(SceneErrors, ExtrapolatedLagHasOnePass) {
+  const auto error_with = [](const std::vector<std::string>& overrides) -> std::string {
+    try {
+      parse_scene_text(full_scene, "a.json", overrides);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error_with({"/time/lag=extrapolated"}), "no error");
+  EXPECT_EQ(error_with({"/time/lag=previous", "/time/lag_passes=2"}), "no error");
+  EXPECT_EQ(error_with({"/time/lag=extrapolated", "/time/lag_passes=2"}),
+            "a.json (--set): /time/lag_passes: got 2, expected 1, since /time/lag is extrapolated: later "
+            "passes would "
+            "have a lag of their own");
+  EXPECT_EQ(error_with({"/time/lag=next"}),
+            "a.json (--set): /time/lag: got \"next\", expected one of \"previous\", \"extrapolated\"");
+}
+
 TEST(SceneErrors, ListsMayNotBeEmpty) {
   std::string text = testing::minimal_scene;
   const size_t begin = text.find("[{"), end = text.find("}]");

@@ -12,7 +12,7 @@
 #include "sim/core/types.h"
 #include "sim/surface/imls.h"
 #include "sim/surface/shapes.h"
-#include "sim/terms/contact_law.h"
+#include "sim/terms/extrapolated_friction_law.h"
 #include "sim/terms/kinematics.h"
 #include "sim/terms/ligament_law.h"
 #include "sim/terms/pre_stretch_law.h"
@@ -257,6 +257,23 @@ inline std::vector<LawCase<FrictionLaw>> friction_cases(const std::vector<ShapeC
       }
       cases.push_back(c);
     }
+  return cases;
+}
+
+/// The same states, with a pressure that rises and falls in turn and a normal that turns.
+inline std::vector<LawCase<ExtrapolatedFrictionLaw>> extrapolated_friction_cases(
+    const std::vector<ShapeChoice>& choices) {
+  Rng rng(18);
+  std::vector<LawCase<ExtrapolatedFrictionLaw>> cases;
+  for (const LawCase<FrictionLaw>& c : friction_cases(choices)) {
+    LawCase<ExtrapolatedFrictionLaw> e{c.name, {c.law}, c.states};
+    for (std::size_t k = 0; k < e.states.size(); ++k) {
+      VectorXd history(8);
+      history << c.states[k].history, k % 2 ? -5 : 3, uniform(rng, 3, 2);
+      e.states[k].history = history;
+    }
+    cases.push_back(e);
+  }
   return cases;
 }
 

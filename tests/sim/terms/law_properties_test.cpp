@@ -138,6 +138,10 @@ TEST(LawProperties, Friction) {
   const auto choices = shapes();
   check_law(friction_cases(choices));
 }
+TEST(LawProperties, ExtrapolatedFriction) {
+  const auto choices = shapes();
+  check_law(extrapolated_friction_cases(choices));
+}
 
 }  // namespace
 }  // namespace rhytid::test

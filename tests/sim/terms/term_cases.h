@@ -127,7 +127,7 @@ inline TermCase volume_case(const KernelTable& kernels, int order, int thickness
   return c;
 }
 
-/// Contact, friction or ligaments (of either law); parameters by constants, a field and a path with a knot
+/// Contact, friction (of either lag) or ligaments (of either law); parameters by constants, a field and a path with a knot
 /// inside the step.
 inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice, int order,
                              Mollifier mollifier = Mollifier::quintic) {
@@ -137,6 +137,7 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
   c.mesh = curved_patch(order, 2, rng);
   c.shape = choice.shape;
   const bool inner = kind == "ligaments" || kind == "fung ligaments";
+  const bool extrapolates = kind == "extrapolated friction", rubs = extrapolates || kind == "friction";
   TermGroup g = surface_group(c.mesh, inner ? SkinSide::inner : SkinSide::outer, triangle_rule(10));
   c.u_old = smooth_displacement(c.mesh, rng, 0.05);
   c.u = c.u_old + smooth_displacement(c.mesh, rng, 0.1);
@@ -171,23 +172,29 @@ inline TermCase surface_case(const std::string& kind, const ShapeChoice& choice,
     c.native_scale[0] = 0.7;
     c.native_scale[2] = 0.4;
     g.theta = {constant(0), constant(1)};
-    if (kind == "friction") g.theta.push_back(constant(2));
+    if (rubs) g.theta.push_back(constant(2));
     for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_now, axis));
-    if (kind == "friction")
+    if (rubs)
       for (int axis = 0; axis < 3; ++axis) g.theta.push_back(path(ThetaSlot::Kind::path_old, axis));
     for (int part = 0; part < 4; ++part) g.theta.push_back(turn(ThetaSlot::Kind::path_now, part));
-    if (kind == "friction") {
+    if (rubs) {
       for (int part = 0; part < 4; ++part) g.theta.push_back(turn(ThetaSlot::Kind::path_old, part));
-      c.terms.emplace_back("friction", friction_kernels(),
-                           FrictionLaw{choice.shape.get(), 0.0, 3.0, mollifier});
+      const FrictionLaw law{choice.shape.get(), 0.0, 3.0, mollifier};
+      if (extrapolates)
+        c.terms.emplace_back("friction", extrapolated_friction_kernels(), ExtrapolatedFrictionLaw{law});
+      else
+        c.terms.emplace_back("friction", friction_kernels(), law);
     } else {
       c.terms.emplace_back("contact", contact_kernels(), ContactLaw{choice.shape.get(), 0.0});
     }
   }
   c.terms.front().add_group(std::move(g));
   c.history.resize(static_cast<Eigen::Index>(c.term().history_size()));
-  for (Eigen::Index k = 0; 4 * k < c.history.size(); ++k)
-    c.history.segment<4>(4 * k) << 0.3, (choice.normal + uniform(rng, 3, 0.2)).normalized();
+  const Eigen::Index ns = c.term().kernels().ns;
+  for (Eigen::Index k = 0; ns * k < c.history.size(); ++k) {
+    c.history.segment<4>(ns * k) << 0.3, (choice.normal + uniform(rng, 3, 0.2)).normalized();
+    if (extrapolates) c.history.segment<4>(ns * k + 4) << (k % 2 ? -1.5 : 1), uniform(rng, 3, 0.5);
+  }
   return c;
 }
 

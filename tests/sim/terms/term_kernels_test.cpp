@@ -23,6 +23,7 @@ std::vector<TermCase> all_cases() {
   for (const ShapeChoice& s : shapes()) {
     cases.push_back(surface_case("contact", s, 2));
     cases.push_back(surface_case("friction", s, 2, Mollifier::quintic));
+    cases.push_back(surface_case("extrapolated friction", s, 2, Mollifier::quintic));
   }
   cases.push_back(surface_case("friction", shapes()[0], 3, Mollifier::quadratic));
   cases.push_back(surface_case("ligaments", shapes()[0], 3));

@@ -10,6 +10,7 @@
 #include "sim/core/parallel.h"
 #include "sim/scene/load.h"
 #include "sim/scene/scene_model.h"
+#include "sim/terms/kernel_table.h"
 #include "tests/support/small_scenes.h"
 
 namespace rhytid {
@@ -89,6 +90,104 @@ TEST(Simulate, HardStepIsBisectedAndEndsInTheSameFrames) {
   EXPECT_NE(failed.failure.find("frame"), std::string::npos) << failed.failure;
   EXPECT_LT(failed.frames(), 2);
   EXPECT_EQ(static_cast<int>(failed.frame_end.back()), static_cast<int>(failed.steps.size()));
+}
+
+/// Pressure and normal of friction, and their rates, of a state: [points][8].
+Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 8, Eigen::RowMajor>> extrapolated_lag(
+    const Model& model, const State& state) {
+  std::size_t k = 0;
+  while (model.terms[k].name() != "friction finger") ++k;
+  EXPECT_EQ(&model.terms[k].kernels(), &extrapolated_friction_kernels());
+  return {state.history.data() + model.history_offset(k), model.terms[k].num_points(), 8};
+}
+
+// The rates that a step leaves are those over its own length, halved or not, so that the next one needs no ratio.
+TEST(Simulate, ExtrapolatedLagKnowsTheLengthsOfHalvedSteps) {
+  Scene s = small_drag(2, 4);
+  s.time.lag = FrictionLag::extrapolated;
+  s.colliders[0].path = {{0, Vec3(-2, 0, 5.02)},
+                         {2. / 24, Vec3(-2, 0, 4.9)},
+                         {3. / 24, Vec3(-2, 0, 4.2)},
+                         {4. / 24, Vec3(-1.6, 0, 4.2)}};
+  const SceneModel m(s);
+  RunOptions options = m.run_options();
+  const Trajectory easy = run_scene(m, options);
+  ASSERT_TRUE(easy.complete) << easy.failure;
+  int most = 0;
+  for (const StepRecord& r : easy.steps) most = std::max(most, r.report.iterations);
+  options.minimiser.max_iterations = most - 1;  // the press of frame 3 now fails at its full length
+  options.max_bisections = 6;
+  const Trajectory run = run_scene(m, options);
+  ASSERT_TRUE(run.complete) << run.failure;
+  ASSERT_GT(run.steps.size(), 4u);
+  double shortest = 1, longest = 0, largest_rate = 0;
+  for (int i = 1; i < static_cast<int>(run.steps.size()); ++i) {
+    const auto old = extrapolated_lag(m.model(), run.before(i)),
+               now = extrapolated_lag(m.model(), run.before(i + 1));
+    const double dt = run.steps[static_cast<std::size_t>(i)].step.dt(),
+                 ratio = dt / run.steps[static_cast<std::size_t>(i) - 1].step.dt();
+    shortest = std::min(shortest, ratio), longest = std::max(longest, ratio);
+    EXPECT_LE((now.leftCols<4>() - old.leftCols<4>() - dt * now.rightCols<4>()).cwiseAbs().maxCoeff(), 1e-14)
+        << i;
+    largest_rate = std::max(largest_rate, now.rightCols<4>().cwiseAbs().maxCoeff());
+  }
+  EXPECT_LT(shortest, 0.51);
+  EXPECT_NEAR(longest, 2, 1e-12);
+  EXPECT_GT(largest_rate, 0.1);
+  EXPECT_EQ(extrapolated_lag(m.model(), run.before(1)).rightCols<4>().norm(), 0)
+      << "nothing before the first step";
+  // The same way in other steps.
+  EXPECT_LT((run.at_frame(4).u - easy.at_frame(4).u).lpNorm<Eigen::Infinity>(),
+            0.2 * easy.at_frame(4).u.lpNorm<Eigen::Infinity>());
+}
+
+TEST(Simulate, ExtrapolatedLagGoesOnFromAKeptStateWithTheSameBits) {
+  Scene s = small_drag(2, 6);
+  s.time.lag = FrictionLag::extrapolated;
+  const SceneModel m(s);
+  RunOptions options = m.run_options();
+  const Trajectory whole = run_scene(m, options);
+  ASSERT_TRUE(whole.complete) << whole.failure;
+  for (const int done : {1, 4}) {
+    options.frames_done = done;
+    const Trajectory rest = simulate(m.model(), m.native(), options, {}, &whole.at_frame(done));
+    ASSERT_TRUE(rest.complete) << rest.failure;
+    EXPECT_TRUE(same_bits(rest.steps.back().state.u, whole.steps.back().state.u)) << done;
+    EXPECT_TRUE(same_bits(rest.steps.back().state.history, whole.steps.back().state.history)) << done;
+  }
+  // What it extrapolates matters: without the rates it ends elsewhere.
+  State without = whole.at_frame(4);
+  const auto points = extrapolated_lag(m.model(), without).rows();
+  std::size_t k = 0;
+  while (m.model().terms[k].name() != "friction finger") ++k;
+  for (Eigen::Index q = 0; q < points; ++q)
+    without.history.segment<4>(static_cast<Eigen::Index>(m.model().history_offset(k)) + 8 * q + 4).setZero();
+  options.frames_done = 4;
+  const Trajectory other = simulate(m.model(), m.native(), options, {}, &without);
+  EXPECT_GT((other.steps.back().state.u - whole.steps.back().state.u).lpNorm<Eigen::Infinity>(), 1e-4);
+}
+
+// A scene that does not ask for it has the history, the kernels and so the bits of one that never heard of it.
+TEST(Simulate, ScenesWithoutExtrapolatedLagDoNotPayForIt) {
+  const Scene plain = small_drag(2, 4);
+  EXPECT_EQ(plain.time.lag, FrictionLag::previous);
+  Scene other = plain;
+  other.time.lag = FrictionLag::extrapolated;
+  const SceneModel m(plain), extrapolated(other);
+  std::size_t points = 0;
+  for (const Term& term : m.model().terms) {
+    if (term.name() != "friction finger") continue;
+    EXPECT_EQ(&term.kernels(), &friction_kernels());
+    points = static_cast<std::size_t>(term.num_points());
+    EXPECT_EQ(term.history_size(), 4 * points);
+  }
+  ASSERT_GT(points, 0u);
+  EXPECT_EQ(extrapolated.model().history_size(), m.model().history_size() + 4 * points);
+  // There is nothing to extrapolate in the first two steps: they are the same.
+  const Trajectory a = run_scene(m, m.run_options()), b = run_scene(extrapolated, extrapolated.run_options());
+  ASSERT_TRUE(a.complete && b.complete);
+  EXPECT_TRUE(same_bits(a.at_frame(1).u, b.at_frame(1).u));
+  EXPECT_GT((a.at_frame(4).u - b.at_frame(4).u).lpNorm<Eigen::Infinity>(), 1e-4);
 }
 
 /// The first half of a frame is accepted, the second fails at full depth: what the run then says.
