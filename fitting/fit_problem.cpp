@@ -50,6 +50,10 @@ SkinMesh first_frame_mesh(const SceneModel& model, const RunOptions& options) {
   return mesh;
 }
 
+/// Relative tolerances of the minimiser above this have their steps polished: below it derivatives are right to some
+/// 1e-9 without, far better than the tracks that they explain, and a polish costs every pass of a step a factor.
+constexpr double kPolishAbove = 1e-8;
+
 }  // namespace
 
 FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const Camera& camera, const TrackSet& tracks)
@@ -61,7 +65,8 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
   options_ = model_.run_options();
   options_.frames = last_used_frame(scene, fit);
   options_.keep_states = true;
-  options_.minimiser.polish = true;  // gradients are then exact to the square of the tolerance
+  // The error of a derivative is of the order of the tolerance, or of its square after a polish.
+  options_.minimiser.polish = options_.minimiser.relative_tolerance > kPolishAbove;
   if (options_.frames < 1) throw InputError("fit: frames", "0", "a scene with at least one frame after rest");
   require_names(cameras, tracks);
   const SkinMesh seen_first = first_frame_mesh(model_, options_);

@@ -12,22 +12,25 @@ StepSolver::StepSolver(const Model& model, const VectorXd& native, const Minimis
     : model_(&model),
       native_(&native),
       options_(options),
+      earlier_options_(options),
       passes_(passes),
       matrix_(model.pattern()),
       factor_(model.pattern()) {
   require(passes >= 1, "StepSolver: at least one pass");
+  earlier_options_.certify_minimum = false;
   const auto lags = [](const Term& term) { return term.kernels().history_is_lag; };
   if (std::none_of(model.terms.begin(), model.terms.end(), lags)) passes_ = 1;
 }
 
-MinimiserReport StepSolver::solve_pass(VectorXd& q, const VectorXd& held, const IterationCallback& callback,
-                                       GivenFactor given) {
+MinimiserReport StepSolver::solve_pass(int pass, VectorXd& q, const VectorXd& held,
+                                       const IterationCallback& callback, GivenFactor given) {
+  const MinimiserOptions& options = pass < passes_ ? earlier_options_ : options_;
   const bool moved = q != held;
-  MinimiserReport report = minimise(*problem_, q, options_, factor_, matrix_, callback, given);
+  MinimiserReport report = minimise(*problem_, q, options, factor_, matrix_, callback, given);
   if (report.converged() || report.status == MinimiserStatus::interrupted || !moved) return report;
   q = held;
   const MinimiserReport given_up = std::move(report);
-  report = minimise(*problem_, q, options_, factor_, matrix_, callback);
+  report = minimise(*problem_, q, options, factor_, matrix_, callback);
   report.add_work(given_up);
   return report;
 }
@@ -49,7 +52,7 @@ MinimiserReport StepSolver::solve(const StepInfo& step, const State& old, const 
     }
   }
   const VectorXd held = start ? q : model_->to_unknowns(old.u);
-  MinimiserReport first = solve_pass(q, held, callback, given);
+  MinimiserReport first = solve_pass(1, q, held, callback, given);
   first.add_work(guess);
   return solve_later_passes(step, std::move(first), std::move(q), held, callback);
 }
@@ -75,7 +78,7 @@ MinimiserReport StepSolver::solve_later_passes(const StepInfo& step, MinimiserRe
     lagged_ = std::move(next);
     problem_.emplace(*model_, *native_, step, lagged_);
     // Only what the friction is lagged from has changed.
-    MinimiserReport report = solve_pass(q, held, callback, GivenFactor::near);
+    MinimiserReport report = solve_pass(pass + 1, q, held, callback, GivenFactor::near);
     report.iterations += total.iterations;
     report.lbfgs_iterations += total.lbfgs_iterations;
     report.negative_curvature_exits += total.negative_curvature_exits;

@@ -18,7 +18,8 @@
 
 namespace rhytid {
 
-/// Solves steps one after the other, reusing matrix and factor. Model and native must outlive it.
+/// Solves steps one after the other, reusing matrix and factor. Model and native must outlive it. Passes before a step's
+/// last are not certified as minima: what they are for is where contact presses.
 class StepSolver {
  public:
   /// `passes` ≥ 1 solves per step; 1 is enough, and used, for a model without lagged friction.
@@ -41,14 +42,14 @@ class StepSolver {
   const std::vector<VectorXd>& earlier_passes() const { return earlier_; }
 
  private:
-  MinimiserReport solve_pass(VectorXd& q, const VectorXd& held, const IterationCallback& callback,
+  MinimiserReport solve_pass(int pass, VectorXd& q, const VectorXd& held, const IterationCallback& callback,
                              GivenFactor given);
   MinimiserReport solve_later_passes(const StepInfo& step, MinimiserReport first, VectorXd q,
                                      const VectorXd& held, const IterationCallback& callback);
 
   const Model* model_;
   const VectorXd* native_;
-  MinimiserOptions options_;
+  MinimiserOptions options_, earlier_options_;  ///< of the last pass, of those before it
   int passes_;
   BlockMatrix matrix_;
   CholeskyFactor factor_;
