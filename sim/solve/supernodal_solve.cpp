@@ -56,6 +56,8 @@ constexpr double kPieceShare = 1. / 24;
 constexpr int kPanelWidth = 128;
 // Panels with fewer entries below their triangle are not worth two meetings of the threads (a microsecond each).
 constexpr std::ptrdiff_t kSplitFrom = 24'000;
+// With fewer entries to multiply by, threads take as long to meet as they save.
+constexpr double kThreadsFrom = 1.5e6;
 constexpr int kRowsAtOnce = 192, kColumnsAtOnce = 32;
 
 /// X := L⁻¹ X or L⁻ᵀ X for a triangle of n columns.
@@ -146,7 +148,7 @@ void SupernodalSolve::find_pieces() {
   for (int s = 0; s < n; ++s) std::fill_n(super_of.begin() + supernodes_.first(s), supernodes_.width(s), s);
   std::vector<int> parent(n, -1), first(n), members(n, 1);
   std::vector<double> entries(n);
-  double total = 0;
+  double& total = entries_;
   for (int s = 0; s < n; ++s) {
     first[s] = s;
     entries[s] = static_cast<double>(supernodes_.width(s)) * supernodes_.height(s);
@@ -318,6 +320,7 @@ void SupernodalSolve::solve_top(Work<Real>& work, int thread) const {
 template <class Real>
 void SupernodalSolve::solve(Real* x, int columns, int threads) const {
   if (columns == 0) return;
+  if (entries_ * columns < kThreadsFrom) threads = 1;
   Work<Real> work(x, supernodes_.size(), columns, threads, outside_rows_, largest_height_);
 #pragma omp parallel num_threads(threads)
   {

@@ -66,6 +66,7 @@ class SupernodalSolve {
   std::vector<int> places_;       ///< rows outside the piece → their place below its root
   std::size_t outside_rows_ = 0;  ///< of all pieces
   int largest_height_ = 0;
+  double entries_ = 0;  ///< of the factor
 };
 
 }  // namespace rhytid
