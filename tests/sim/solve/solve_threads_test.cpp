@@ -63,8 +63,8 @@ BlockMatrix random_matrix(const BlockPattern& pattern) {
 }
 
 TEST_F(SolveThreads, SameBitsForAnyNumberOfThreads) {
-  // A top supernode of several panels, and subtrees below it.
-  const BlockPattern pattern = grid_pattern(61, 5);
+  // A top supernode of several panels, and subtrees below it; large enough for solves on several threads.
+  const BlockPattern pattern = grid_pattern(85, 5);
   const BlockMatrix matrix = random_matrix(pattern);
   const VectorXd rhs = VectorXd::LinSpaced(pattern.num_unknowns(), -1, 1);
   MatrixXd several(pattern.num_unknowns(), 5);
