@@ -94,25 +94,27 @@ StepCost measure_step_cost(const SceneModel& scene_model) {
   if (!std::isfinite(energy)) return cost;
   cost.hessian_seconds = seconds_of([&] { problem.hessian_at(u, Curvature::raw, matrix); });
   const VectorXd force = VectorXd::Ones(gradient.size());
-  cost.certificate_seconds = cost.factor_seconds =
-      seconds_of([&] { cost.positive_definite = factor.factorize(matrix); });
+  cost.factor_seconds = seconds_of([&] { cost.positive_definite = factor.factorize(matrix); });
   cost.factor_entries = factor.factor_entries();
   if (!cost.positive_definite) return cost;
   cost.smallest_pivot = factor.smallest_pivot();
   cost.largest_pivot = factor.largest_pivot();
-  cost.solve_seconds = seconds_of([&] { (void)factor.solve(force); });
+  cost.direction_seconds = cost.solve_seconds = seconds_of([&] { (void)factor.solve(force); });
   const MinimiserOptions& options = scene_model.run_options().minimiser;
   if (!steers_by_single_precision(options, factor)) return cost;
   bool single = true;
   const double factor_seconds =
       seconds_of([&] { single = factor.factorize(matrix, 0, Precision::single) && single; });
-  const double solve_seconds = seconds_of([&] {
+  if (!factor.usable()) return cost;
+  const double solve_seconds = seconds_of([&] { (void)factor.solve(force); });
+  const double direction_seconds = seconds_of([&] {
     single =
         single && factor.solve_iteratively(matrix, force, kDirectionTolerance, kMaxCorrections).has_value();
   });
   if (single) {
     cost.factor_seconds = factor_seconds;
     cost.solve_seconds = solve_seconds;
+    cost.direction_seconds = direction_seconds;
   }
   return cost;
 }

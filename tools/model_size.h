@@ -25,32 +25,32 @@ struct ModelSize {
 };
 ModelSize model_size(const SceneModel& scene_model);
 
-/// Newton iterations per step that an estimate assumes: 4 to 8 were seen on the bundled scenes; where a finger drags
-/// over a film that wrinkles they are twice as many.
-inline constexpr int expected_iterations = 6;
+/// What an estimate assumes: iterations of each pass of a step, of which 7 to 14 were seen on the bundled scenes, and
+/// Hessians with their factors in a step, 3 to 7, whatever its passes (they share them).
+inline constexpr int expected_iterations = 12, expected_factors = 5;
 
 /// The parts of a measured Newton iteration at rest, colliders at time 0, and what follows for the run.
 struct StepCost {
   double residual_seconds = 0, hessian_seconds = 0;
   double factor_seconds = 0,
-         solve_seconds = 0;        ///< of an iteration: in single precision where the solver takes that
-  double certificate_seconds = 0;  ///< factor in double precision at the end of a step
-  double state_seconds = 0;        ///< preparing a step and the state after it
-  double analysis_seconds = 0;     ///< symbolic analysis, once per run
-  std::size_t factor_entries = 0;  ///< nnz(L) stored
-  bool positive_definite = false;  ///< of the raw Hessian at rest
+         solve_seconds = 0;  ///< in single precision where the solver takes that
+  double direction_seconds =
+      0;                     ///< of Newton's step: a solve, with its corrections where the factor is single
+  double state_seconds = 0;  ///< preparing a step and the state after it
+  double analysis_seconds = 0;                   ///< symbolic analysis, once per run
+  std::size_t factor_entries = 0;                ///< nnz(L) stored
+  bool positive_definite = false;                ///< of the raw Hessian at rest
   double smallest_pivot = 0, largest_pivot = 0;  ///< diagonal of L², N/mm; 0 unless positive definite
   double rest_residual =
       0;  ///< |∂W/∂q|₂ where the first step starts, N: exactly 0 for a rest equilibrium; infinite outside the domain
-  double iteration_seconds() const {
-    // A line search takes about one and a half evaluations per accepted step.
-    return 1.5 * residual_seconds + hessian_seconds + factor_seconds + solve_seconds;
-  }
-  /// A step ends with the Hessian and its factor at the solution, the certificate of a minimum. Later passes over the
-  /// lag (`passes` of them in all) start from the state of the one before.
+  /// With the factor kept. A line search takes about one and a third evaluations per accepted step.
+  double iteration_seconds() const { return 4. / 3 * residual_seconds + solve_seconds; }
+  /// A Hessian with its factor and Newton's direction. The last of a step is mostly its certificate as a minimum.
+  double newton_seconds() const { return hessian_seconds + factor_seconds + direction_seconds; }
+  /// `passes` over the lag in all.
   double step_seconds(int passes = 1) const {
-    return state_seconds +
-           passes * (expected_iterations * iteration_seconds() + hessian_seconds + certificate_seconds);
+    return state_seconds + passes * expected_iterations * iteration_seconds() +
+           expected_factors * newton_seconds();
   }
 };
 /// Measures on the calling machine with the threads in force what things take on cores of its own; the quick ones

@@ -147,11 +147,13 @@ ordered_json to_json(const Findings& f) {
                      {"node_spacing_mm", f.wrinkles->node_spacing},
                      {"nodes_per_wavelength", f.wrinkles->nodes_per_wavelength()}};
   j["estimate"] = {{"steps", f.steps()},
-                   {"iterations_per_step", expected_iterations},
+                   {"iterations_per_pass", expected_iterations},
+                   {"factors_per_step", expected_factors},
                    {"residual_s", f.cost.residual_seconds},
                    {"hessian_s", f.cost.hessian_seconds},
                    {"factorisation_s", f.cost.factor_seconds},
                    {"solve_s", f.cost.solve_seconds},
+                   {"direction_s", f.cost.direction_seconds},
                    {"step_s", f.cost.step_seconds()},
                    {"analysis_s", f.cost.analysis_seconds},
                    {"run_s", f.run_seconds()},
@@ -264,13 +266,15 @@ void print(const Findings& f, std::ostream& out) {
                 ", elements " + number_text(f.memory.elements, "%.0f") + ", program " +
                 number_text(f.memory.program, "%.0f") + "; this check holds " +
                 number_text(resident_memory_mb(), "%.0f MB"));
-  lines.row("one iteration", seconds_text(f.cost.iteration_seconds()) + ": residual " +
-                                 seconds_text(f.cost.residual_seconds) + ", Hessian " +
-                                 seconds_text(f.cost.hessian_seconds) + ", factorisation " +
-                                 seconds_text(f.cost.factor_seconds));
+  lines.row("one Newton step", seconds_text(f.cost.newton_seconds() + 4. / 3 * f.cost.residual_seconds) +
+                                   ": residual " + seconds_text(f.cost.residual_seconds) + ", Hessian " +
+                                   seconds_text(f.cost.hessian_seconds) + ", factorisation " +
+                                   seconds_text(f.cost.factor_seconds) + "; with a factor kept " +
+                                   seconds_text(f.cost.iteration_seconds()));
   lines.row("run", "about " + seconds_text(f.run_seconds()) + ": " + std::to_string(f.steps()) + " steps x " +
                        (f.passes() > 1 ? std::to_string(f.passes()) + " passes x " : "") +
-                       std::to_string(expected_iterations) + " iterations, on cores of its own");
+                       std::to_string(expected_iterations) + " iterations, " +
+                       std::to_string(expected_factors) + " factors a step, on cores of its own");
   if (f.pictured_frames() > 0)
     lines.row("pictures", "about " + seconds_text(f.pictured_frames() * f.picture_seconds) +
                               " more: 2 of each of " + std::to_string(f.pictured_frames()) +
