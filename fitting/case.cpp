@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "fitting/case_consider.h"
 #include "fitting/case_rules.h"
 #include "fitting/colmap.h"
 #include "sim/core/error.h"
@@ -260,21 +261,6 @@ void read_clips(const LocatedJson& located, Case& c) {
     else
       clip.views.push_back(read_view(c, j, pointer));
     c.clips.push_back(std::move(clip));
-  }
-}
-
-/// Held parameters that the case says how well they are known.
-void read_considered(const LocatedJson& located, const std::vector<Scene>& scenes, Case& c) {
-  if (!located.json["fit"].contains("consider")) return;
-  c.fit.consider.emplace();
-  const json& list = located.json["fit"]["consider"];
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const std::string pointer = "/fit/consider/" + std::to_string(i) + "/address";
-    for (FitParameter named :
-         parameters_named(c, scenes, list[i]["address"], located.where(pointer) + ": " + pointer)) {
-      named.prior_sigma = list[i]["sigma"].get<double>();
-      c.fit.consider->push_back(std::move(named));
-    }
   }
 }
 

@@ -46,7 +46,18 @@ struct FitParameter {
   std::vector<std::pair<std::string, double>> moves = {};
   std::string name = {};   ///< for reports; of the scene's own parameters the scene says it
   std::string group = {};  ///< parameters of one name here are considered as one, by the sum of what they do
-  bool is_held = false;    ///< only differentiated by (consider.h): observations need not outnumber these
+  /// Considered by what the residuals leave of its deviation, which nobody stated (residual_signature.h).
+  bool is_guessed = false;
+  bool is_held = false;  ///< only differentiated by (consider.h): observations need not outnumber these
+};
+
+/// A number of the scene that is none of its parameters, and to what it is known (considered_quantities.h); or the
+/// path of a collider, "/colliders/NAME/path": what all its knots are off alike in each direction, mm.
+struct ConsideredQuantity {
+  std::string address;       ///< into a scene, items of lists by name
+  std::string clip = {};     ///< of this clip alone; empty: of all clips whose scene has it
+  double sigma = 0;          ///< internal units, or of the value itself; 0: it is exact
+  bool is_relative = false;  ///< `sigma` is a fraction of the value
 };
 
 struct RenderCase {
@@ -118,9 +129,11 @@ struct FitCase {
   /// Whether what the discretisation does to the answer is estimated, and enters the intervals.
   bool discretisation_check = true;
   /// Held parameters whose error enters the intervals (consider.h), σ_h in prior_sigma. Nothing given: the friction
-  /// coefficients that are not fitted.
+  /// coefficients that are not fitted, the thicknesses of layers and where paths are.
   std::optional<std::vector<FitParameter>> consider;
-  std::string path_deviations = "consider";  ///< consider | fit | ignore: of a path_file that states them
+  /// With `consider`, what else is considered: numbers that are no parameters, and paths.
+  std::vector<ConsideredQuantity> consider_quantities, consider_paths;
+  std::string path_deviations = "consider";  ///< consider | fit | ignore: those that paths are known to have
   /// Give contact penalties per unit of this layer's Young's modulus, so that the penalty is no hidden
   /// yardstick.
   std::string gauge_layer;  ///< layer whose modulus is fixed; default: the innermost
@@ -174,6 +187,11 @@ Case load_case(const std::string& path, const std::vector<std::string>& settings
 /// without clips. Throws InputError beginning with `where`.
 std::vector<FitParameter> parameters_named(const Case& c, const std::vector<Scene>& scenes,
                                            const std::string& address, const std::string& where);
+
+/// The same for what /fit/consider names besides parameters: a number of the scene, or "/colliders/NAME/path".
+/// `sigma` is left 0. Throws InputError beginning with `where`.
+std::vector<ConsideredQuantity> quantities_named(const Case& c, const std::vector<Scene>& scenes,
+                                                 const std::string& address, const std::string& where);
 
 /// Addresses as the fit knows them (joint_address) of those of `fitted` that an address names; "all" stays.
 /// Throws InputError beginning with `where` when none is fitted.

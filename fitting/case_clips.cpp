@@ -7,6 +7,7 @@
 #include "sim/core/error.h"
 #include "sim/scene/load.h"
 #include "sim/scene/nearest.h"
+#include "sim/scene/scene_quantity.h"
 
 namespace rhytid::fitting {
 
@@ -87,6 +88,43 @@ std::vector<FitParameter> parameters_named(const Case& c, const std::vector<Scen
   if (name == "*") described(scenes[0], rest);  // throws
   throw InputError(where, shown_json(address),
                    "a clip of the case, nearest is \"" + nearest_word(name, names) + "\"");
+}
+
+namespace {
+
+/// The address by names of a number of the scene or of a collider's path. Throws InputError.
+std::string quantity_address(const Scene& scene, const std::string& address) {
+  for (std::size_t i = 0; i < scene.colliders.size(); ++i) {
+    const std::string by_name = "/colliders/" + escape_key(scene.colliders[i].name) + "/path";
+    if (scene.colliders[i].path.empty()) continue;
+    if (address == by_name || address == "/colliders/" + std::to_string(i) + "/path") return by_name;
+  }
+  return describe_quantity(scene, address).address;
+}
+
+}  // namespace
+
+std::vector<ConsideredQuantity> quantities_named(const Case& c, const std::vector<Scene>& scenes,
+                                                 const std::string& address, const std::string& where) {
+  const std::string prefix = "/clips/";
+  const bool is_of_clip = address.starts_with(prefix);
+  const std::size_t end = is_of_clip ? std::min(address.find('/', prefix.size()), address.size()) : 0;
+  const std::string name = is_of_clip ? address.substr(prefix.size(), end - prefix.size()) : "";
+  const std::string rest = address.substr(end);
+  std::vector<ConsideredQuantity> found;
+  std::string expected;
+  for (std::size_t k = 0; k < scenes.size(); ++k) {
+    const std::string clip = k < c.clips.size() ? c.clips[k].name : "";
+    if (is_of_clip && name != "*" && name != clip) continue;
+    try {
+      const std::string by_name = quantity_address(scenes[k], rest);
+      if (is_of_clip || found.empty()) found.push_back({.address = by_name, .clip = is_of_clip ? clip : ""});
+    } catch (const InputError&) {
+      if (expected.empty()) expected = expected_quantity(scenes[k], rest);
+    }
+  }
+  if (!found.empty()) return found;
+  throw InputError(where, shown_json(address), expected.empty() ? "a clip of the case" : expected);
 }
 
 std::vector<std::string> fitted_named(const Case& c, const std::vector<Scene>& scenes,

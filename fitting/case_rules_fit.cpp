@@ -207,25 +207,38 @@ std::vector<Rule> fit_rules() {
        .doc = "Forward runs at most."},
       {.pointer = "/fit/consider",
        .type = RuleType::array,
-       .doc = "Parameters that are held though they are not known exactly: what their error would move "
-              "enters the intervals. Default: friction coefficients that are not fitted, factor 1.35. []: "
-              "none."},
+       .doc =
+           "What is held though it is not known exactly: what its error would move enters the intervals. "
+           "Default: friction coefficients that are not fitted, factor 1.35; the thickness of every layer, "
+           "10 %; paths of colliders that state no deviations, what the residuals leave of 0.25 mm in each "
+           "direction for all knots alike. A list takes the place of all these; []: all is exact."},
       {.pointer = "/fit/consider/*", .type = RuleType::object, .doc = "One of them."},
       {.pointer = "/fit/consider/*/address",
        .type = RuleType::string,
        .is_required = true,
-       .doc = "As that of a fitted parameter; one that is fitted is passed over."},
+       .doc = "As that of a fitted parameter (one that is fitted is passed over), by one more sweep; or any "
+              "other number of the scene, as /skin/layers/NAME/thickness or /base/onset, by one more forward "
+              "run; or /colliders/NAME/path: where the whole path is."},
       {.pointer = "/fit/consider/*/sigma",
-       .is_required = true,
+       .type = RuleType::quantity,
+       .rival = "relative",
+       .needs_one_of_pair = true,
+       .doc =
+           "Its standard deviation. Of a parameter: in the transformed value, so of a logarithm for moduli, "
+           "strengths, friction (0.1: a factor 1.105), mm for knots of a path. Of any other number: in "
+           "that number's unit. Of a path: mm in each direction. 0: it is exact."},
+      {.pointer = "/fit/consider/*/relative",
        .min = 0,
-       .min_is_open = true,
-       .doc = "Its standard deviation, in the transformed value: of a logarithm for moduli, strengths, "
-              "friction; mm for knots of a path."},
+       .max = 1,
+       .max_is_open = true,
+       .doc =
+           "Its standard deviation as a fraction of its value (0.1: ten per cent), where that is positive."},
       {.pointer = "/fit/path_deviations",
        .type = RuleType::option,
        .fallback = c.path_deviations,
        .options = {"consider", "fit", "ignore"},
-       .doc = "What becomes of the deviations that a collider's path_file states, as that of rhytid finger: "
+       .doc = "What becomes of the deviations of a collider's path, which its path_file states, as that of "
+              "rhytid finger, or /fit/consider, or its default: "
               "what they would move widens the intervals (consider); the offset that all knots share is "
               "fitted with them as its prior, and the rest widens (fit); the path counts as exact (ignore)."},
       {.pointer = "/fit/starts",

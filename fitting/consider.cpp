@@ -1,5 +1,6 @@
 #include "fitting/consider.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
@@ -8,7 +9,9 @@
 #include <set>
 
 #include "fitting/fit_logs.h"
+#include "fitting/fit_summary.h"
 #include "fitting/path_deviations.h"
+#include "fitting/residual_signature.h"
 #include "sim/core/error.h"
 #include "sim/scene/parameter.h"
 
@@ -33,6 +36,31 @@ std::string off_by(const FitVariable& v, double sigma) {
                   v.transform == ParameterTransform::none ? v.unit.c_str() : "");
   return text;
 }
+
+/// What a held parameter is off by when its value is off by σ. Of a path whose knots move together: how far, and
+/// along which axis ("finger path x").
+ResidualAxis axis_of(const FitVariable& v, const std::string& group, double sigma) {
+  if (v.moves.empty()) {
+    if (v.transform == ParameterTransform::log) return {v.name, "%", 100 * std::expm1(sigma)};
+    return {v.name, v.transform == ParameterTransform::none ? v.unit : "(logit)", sigma};
+  }
+  const std::string& first = v.moves.front().first;
+  const std::string knot = first.substr(0, first.rfind('/') + 1);
+  Vec3 direction = Vec3::Zero();
+  for (const auto& [address, amount] : v.moves)
+    if (address.starts_with(knot)) direction[address.back() - '0'] = amount;
+  Eigen::Index along = 0;
+  const double most = direction.cwiseAbs().maxCoeff(&along);
+  const std::string end = " offset";
+  const std::string name = group.ends_with(end)
+                               ? group.substr(0, group.size() - end.size()) +
+                                     (most > 0.999 * direction.norm() ? " " : " mostly ") + "xyz"[along]
+                               : v.name;
+  return {name, "mm", sigma * direction.norm()};
+}
+
+/// More axes than these are one deviation by knot: no offset that could be told.
+constexpr std::size_t kMostAxes = 3;
 
 /// Of errors that are told together what matters is Σ δ δᵀ: as many axes as there are parameters say it.
 void sum_up(SystematicShift& found) {
@@ -63,7 +91,7 @@ std::vector<FitParameter> considered_parameters(const JointFitInput& input) {
     const bool is_known = std::any_of(list.begin(), list.end(), [&](const FitParameter& other) {
       return other.address == p.address && other.clip == p.clip;
     });
-    if (!is_known && !is_fitted(input, p)) list.push_back(p);
+    if (!is_known && p.prior_sigma != 0. && !is_fitted(input, p)) list.push_back(p);
   };
   for (const FitParameter& p : input.path_errors) add(p);
   if (input.options.consider) {
@@ -123,6 +151,26 @@ std::vector<SystematicShift> refused(const std::vector<FitParameter>& held, cons
   return shifts;
 }
 
+/// What the shift's axes come to where nobody stated a deviation: not by that of the default, but by what the residuals
+/// leave of it. Their variance is that of what is left when they are explained by these columns.
+void weigh_by_residuals(JointProblem& problem, const VectorXd& t, const FitProblem::Linearised& linearised,
+                        const MatrixXd& basis, const MatrixXd& columns, SystematicShift& shift) {
+  const NoiseCheck noise = check_noise(problem, t, linearised.residuals);
+  const double left = std::max(0.0, linearised.residuals.squaredNorm() - shift.explained) /
+                      std::max(1, problem.degrees_of_freedom());
+  const double widening = interval_widening(left, noise.autocorrelation);
+  const Eigen::LLT<MatrixXd> squares(expected_squares(linearised, basis, columns, widening * widening));
+  if (squares.info() != Eigen::Success) return;
+  const auto count = static_cast<Eigen::Index>(shift.axes.size());
+  MatrixXd axes(static_cast<Eigen::Index>(shift.axes.front().size()), count);
+  for (Eigen::Index a = 0; a < count; ++a)
+    axes.col(a) = Eigen::Map<const VectorXd>(shift.axes[static_cast<std::size_t>(a)].data(), axes.rows());
+  axes = axes * MatrixXd(squares.matrixL());
+  for (Eigen::Index a = 0; a < count; ++a)
+    shift.axes[static_cast<std::size_t>(a)].assign(axes.col(a).begin(), axes.col(a).end());
+  shift.change += " by default, weighed by what the residuals leave of them";
+}
+
 /// The input with these parameters behind its own, at the values that they have at t.
 JointFitInput with_held(const JointFitInput& input, const std::vector<FitParameter>& held,
                         const JointProblem& problem, const VectorXd& t) {
@@ -169,6 +217,8 @@ Considered consider(const JointFitInput& input, const std::vector<FitParameter>&
     const bool is_same_run =
         at && there.size() == here.size() && (there - here).norm() <= 1e-6 * (1 + here.norm());
     out.failed = !is_same_run;
+    std::vector<std::vector<Eigen::Index>> columns;  // of each shift
+    std::vector<std::vector<ResidualAxis>> axes;
     for (std::size_t h = 0; h < held.size(); ++h) {
       const Eigen::Index column = n + static_cast<Eigen::Index>(h);
       const FitVariable& v = considered.variables()[static_cast<std::size_t>(column)];
@@ -177,8 +227,10 @@ Considered consider(const JointFitInput& input, const std::vector<FitParameter>&
       if (group.empty() || h == 0 || held[h - 1].group != group) {
         shifts.emplace_back().name = "held " + (group.empty() ? v.name : group);
         shifts.back().change = group.empty() ? v.name + " " + off_by(v, sigma)
-                                             : group + ", off by the deviations that its file states";
+                                             : group + ", off by the deviations that it is known to";
+        columns.emplace_back(), axes.emplace_back();
       }
+      columns.back().push_back(column), axes.back().push_back(axis_of(v, group, sigma));
       SystematicShift& found = shifts.back();
       const double used = v.to_parameter(all[column]);
       if (!at)
@@ -197,7 +249,20 @@ Considered consider(const JointFitInput& input, const std::vector<FitParameter>&
       else
         found.axes.emplace_back(shift.begin(), shift.end());
     }
-    for (SystematicShift& found : shifts) sum_up(found);
+    for (std::size_t g = 0; g < shifts.size(); ++g) {
+      if (!shifts[g].failure.empty() || axes[g].size() > kMostAxes) {
+        sum_up(shifts[g]);
+        continue;
+      }
+      MatrixXd moved(at->jacobian.rows(), static_cast<Eigen::Index>(axes[g].size()));
+      for (std::size_t k = 0; k < axes[g].size(); ++k)
+        moved.col(static_cast<Eigen::Index>(k)) =
+            *held[static_cast<std::size_t>(columns[g][k] - n)].prior_sigma * at->jacobian.col(columns[g][k]);
+      add_signature(linearised, basis, moved, axes[g], shifts[g]);
+      if (held[static_cast<std::size_t>(columns[g].front() - n)].is_guessed)
+        weigh_by_residuals(problem, t, linearised, basis, moved, shifts[g]);
+      sum_up(shifts[g]);
+    }
   } catch (const InputError& error) {
     shifts = refused(held, error.what());
     out.failed = true;

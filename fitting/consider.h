@@ -5,6 +5,7 @@
 //
 // is by how much the answer moves, to first order, when h is off by σ_h. Residuals do not show it: a wrong
 // friction is fitted away by moduli. Each δ_h enters the covariance as δ_h δ_hᵀ (identifiability.h).
+// Numbers of the scene that no derivative is known of: considered_quantities.h.
 //
 // Source  Schmidt 1966; Tapley, Schutz and Born 2004, "consider covariance analysis".
 // Tests   tests/fitting/consider_test.cpp
@@ -21,7 +22,7 @@ inline constexpr double kFrictionSigma = 0.3;
 
 /// The parameters to consider: those of the case that are not fitted, or, where the case names none, the friction
 /// coefficients of all colliders that are not, clip by clip where clips hold different values or only some fit it; σ_h
-/// in prior_sigma.
+/// in prior_sigma; behind what paths of colliders are off by (`path_errors`). Those with σ_h = 0 are exact.
 std::vector<FitParameter> considered_parameters(const JointFitInput& input);
 
 /// One run of every clip with one more sweep, at `t`, where the problem was last evaluated with the

@@ -1,13 +1,8 @@
 #include "fitting/discretisation.h"
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <map>
-#include <utility>
 
-#include "fitting/fit_logs.h"
-#include "sim/core/error.h"
+#include "fitting/difference_shifts.h"
 #include "sim/scene/skin_rule.h"
 
 namespace rhytid::fitting {
@@ -68,44 +63,17 @@ FinerScene finer_steps(const Scene& scene) {
   return finer;
 }
 
-/// Whitened change of the residuals of one clip, rows as in its linearisation; tracks that only one of both
-/// could attach stay as they are.
-void add_change(const FitProblem& clip, const FitEvaluation& at, const FitProblem& finer,
-                const FitEvaluation& finer_at, Eigen::Index row, VectorXd& change, double& squares,
-                int& count) {
-  std::map<std::pair<int, int>, std::size_t> of_finer;  // camera and track
-  for (std::size_t i = 0; i < finer.compared().size(); ++i)
-    of_finer[{finer.compared()[i].camera, finer.compared()[i].track}] = i;
-  for (std::size_t i = 0; i < clip.compared().size(); ++i) {
-    const TrackNoise& noise = clip.noise()[i];
-    const auto same = of_finer.find({clip.compared()[i].camera, clip.compared()[i].track});
-    if (same != of_finer.end() && finer.compared()[same->second].frames == clip.compared()[i].frames) {
-      const VectorXd difference = finer_at.differences[same->second] - at.differences[i];
-      change.segment(row, noise.num_rows()) =
-          noise.weighted_residual(finer_at.differences[same->second], at.tracks[i]) -
-          noise.weighted_residual(at.differences[i], at.tracks[i]);
-      squares += difference.squaredNorm();
-      count += static_cast<int>(difference.size()) / 2;
-    }
-    row += noise.num_rows();
-  }
-  change.segment(row, at.measured.size()) = finer_at.measured - at.measured;
-}
-
 /// The clips of the fit with their scenes replaced.
-struct FinerFit {
-  std::string name, change;
-  JointFitInput input;
-};
-
-std::vector<FinerFit> finer_fits(const JointFitInput& input) {
-  std::vector<FinerFit> fits;
+std::vector<OtherFit> finer_fits(const JointFitInput& input) {
+  std::vector<OtherFit> fits;
   for (std::size_t c = 0; c < input.clips.size(); ++c) {
     const std::vector<FinerScene> variants = finer_scenes(input.clips[c].scene);
     for (std::size_t r = 0; r < variants.size(); ++r) {
       if (c == 0) {
-        fits.push_back({variants[r].name, variants[r].change, input});
-        if (!input.evaluations.empty()) fits.back().input.evaluations += "/finer_" + variants[r].name;
+        const auto& [name, change, scene] = variants[r];
+        fits.push_back(
+            {name, change, "discretisation: " + change, input, "", {.name = name + " (" + change + ")"}});
+        if (!input.evaluations.empty()) fits.back().input.evaluations += "/finer_" + name;
       }
       fits[r].input.clips[c].scene = variants[r].scene;
     }
@@ -123,42 +91,7 @@ std::vector<SystematicShift> discretisation_shifts(const JointFitInput& input, J
                                                    const VectorXd& t,
                                                    const FitProblem::Linearised& linearised,
                                                    const MatrixXd& basis, const FitObserver& observer) {
-  std::vector<SystematicShift> shifts;
-  for (const FinerFit& fit : finer_fits(input)) {
-    if (observer.should_stop && observer.should_stop()) return {};
-    if (observer.note) observer.note("discretisation: " + fit.change);
-    SystematicShift& found = shifts.emplace_back();
-    found.name = fit.name, found.change = fit.change;
-    const auto start = std::chrono::steady_clock::now();
-    try {
-      JointProblem finer(fit.input.clips, fit.input.options);
-      finer.stop_when(observer.should_stop);
-      const FitLogs logs(fit.input, finer, observer.note);
-      const ObjectiveEvaluation& evaluation = finer.evaluate(t);
-      if (finer.was_stopped()) return {};
-      if (evaluation.failed) {
-        found.failure = evaluation.failure;
-        continue;
-      }
-      VectorXd change = VectorXd::Zero(linearised.residuals.size());
-      double squares = 0;
-      int count = 0;
-      Eigen::Index row = 0;
-      for (int c = 0; c < problem.num_clips(); ++c) {
-        const VectorXd own = problem.of_clip(c, t);
-        add_change(problem.clip(c), problem.clip(c).evaluate(own), finer.clip(c), finer.clip(c).evaluate(own),
-                   row, change, squares, count);
-        row += problem.clip(c).num_residuals();
-      }
-      const VectorXd shift = -basis * (basis.transpose() * (linearised.jacobian.transpose() * change));
-      found.shift.assign(shift.begin(), shift.end());
-      found.rms_px = std::sqrt(squares / std::max(1, count));
-    } catch (const InputError& error) {
-      found.failure = error.what();
-    }
-    found.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  }
-  return shifts;
+  return difference_shifts(finer_fits(input), problem, t, linearised, basis, observer);
 }
 
 }  // namespace rhytid::fitting

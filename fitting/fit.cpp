@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fitting/consider.h"
+#include "fitting/considered_quantities.h"
 #include "fitting/discretisation.h"
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
@@ -12,6 +13,7 @@
 #include "fitting/median.h"
 #include "fitting/path_deviations.h"
 #include "fitting/profile.h"
+#include "fitting/residual_signature.h"
 #include "fitting/stages.h"
 #include "fitting/starts.h"
 #include "fitting/wave_lead.h"
@@ -99,6 +101,12 @@ void describe_best(const JointFitInput& input, JointProblem& problem, WaveLead* 
     if (held.empty()) stop_here();
     result.systematic.insert(result.systematic.end(), held.begin(), held.end());
   }
+  if (!considered_quantities(input).empty() && !problem.was_stopped()) {
+    const std::vector<SystematicShift> moved =
+        quantity_shifts(input, problem, t, *linearised, found.basis(), observer);
+    if (moved.empty()) stop_here();
+    result.systematic.insert(result.systematic.end(), moved.begin(), moved.end());
+  }
   add_path_notes(input, result);
   for (const SystematicShift& shift : result.systematic) {
     if (!shift.failure.empty()) continue;
@@ -110,6 +118,7 @@ void describe_best(const JointFitInput& input, JointProblem& problem, WaveLead* 
   add_modulus_ratios(problem, found, t, truth, result);
   add_clip_chi_squares(problem, *linearised, found, result);
   add_systematic_notes(input.options, result);
+  result.misfit = misfit_sentences(result, problem.degrees_of_freedom(), noise.autocorrelation);
   result.singular_values = found.singular_values();
   result.right_vectors = found.right_vectors();
   result.correlation = found.correlation();

@@ -255,6 +255,7 @@ std::string answer_text(const FitResult& result) {
   if (!result.profiles.empty()) text += "\n" + profile_table(result) + "\n";
   if (!result.systematic.empty()) text += "\n" + shift_table(result);
   text += further_view_line(result);
+  for (const std::string& sentence : result.misfit) text += "Misfit: " + sentence + "\n";
   for (const std::string& sentence : result.cannot_tell) text += "Cannot tell: " + sentence + "\n";
   return text;
 }

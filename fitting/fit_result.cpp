@@ -66,6 +66,15 @@ void fields(Archive& field, Record& i) {
   field("values", i.values);
 }
 
+template <class Archive, Writable<ResidualAxis> Record>
+void fields(Archive& field, Record& a) {
+  field("name", a.name);
+  field("unit", a.unit);
+  field("amount", a.amount);
+  field("estimate", a.estimate);
+  field("sigma", a.sigma);
+}
+
 template <class Archive, Writable<SystematicShift> Record>
 void fields(Archive& field, Record& d) {
   field("name", d.name);
@@ -75,6 +84,8 @@ void fields(Archive& field, Record& d) {
   field("seconds", d.seconds);
   field("shift", d.shift);
   field.optional("axes", d.axes);
+  field.optional("signature", d.signature);
+  if (!d.signature.empty()) field("explained", d.explained);
 }
 
 template <class Archive, Writable<FittedStage> Record>
@@ -182,6 +193,7 @@ void fields(Archive& field, Record& r) {
   field("derived", r.derived);
   field("gauge", r.gauge);
   field("cannot_tell", r.cannot_tell);
+  field.optional("misfit", r.misfit);
   field("initial_cost", r.initial_cost);
   field("final_cost", r.final_cost);
   field("num_observations", r.num_observations);

@@ -33,8 +33,17 @@ struct DerivedQuantity {
   double power = 1;
 };
 
+/// One change of the model that the residuals may look like (residual_signature.h).
+struct ResidualAxis {
+  std::string name;       ///< what is off: "finger path x", "film thickness"
+  std::string unit = {};  ///< mm, %, ...; empty: times the change
+  double amount = 1;      ///< of the change that was looked at, in that unit
+  double estimate = 0;    ///< by how much of that change the residuals say that it is off
+  double sigma = 0;       ///< of the estimate, where whitened residuals have variance 1
+};
+
 /// By how much the answer would move with one kind of step of the discretisation finer (discretisation.h), or
-/// with a held parameter off by its deviation (consider.h).
+/// with something that is held off by its deviation (consider.h, considered_quantities.h).
 struct SystematicShift {
   std::string name;           ///< thickness | plane | steps | held NAME
   std::string change;         ///< what was changed, in words
@@ -44,6 +53,8 @@ struct SystematicShift {
   std::vector<double> shift;  ///< [parameters] of the transformed parameters; empty when it was not run
   /// Of several errors that are told together: shifts whose squares add up to those of `shift`, which has no sign then.
   std::vector<std::vector<double>> axes = {};
+  std::vector<ResidualAxis> signature = {};  ///< what the residuals say of it; empty where not looked at
+  double explained = 0;                      ///< of |z|² of the whitened residuals, by the whole signature
   bool is_held() const { return name.starts_with("held"); }
 };
 
@@ -168,13 +179,14 @@ struct FitResult {
   int forward_runs = 0, jacobian_runs = 0;
   double seconds = 0, forward_seconds = 0;  ///< whole fit; median forward run
   std::vector<FitIteration> history;
-  std::vector<SystematicShift> systematic;  ///< finer steps, then held parameters
+  std::vector<SystematicShift> systematic;  ///< finer steps, then what is held
   std::vector<ParameterProfile> profiles;   ///< of the parameters that were asked for
   std::vector<FittedStart> starts;          ///< empty when there was one
   VectorXd singular_values;              ///< of the whitened Jacobian by transformed parameters, descending
   MatrixXd right_vectors;                ///< [parameters][parameters] columns belong to singular_values
   MatrixXd correlation;                  ///< [parameters][parameters] of the covariance that sigma is from
   std::vector<std::string> cannot_tell;  ///< sentences: what the footage does not determine
+  std::vector<std::string> misfit;       ///< sentences: what residuals above the noise look like
   std::vector<std::string> notes;        ///< schemes, settings, warnings
   std::vector<FitResidual> residuals;
   std::vector<FurtherView> further_views;

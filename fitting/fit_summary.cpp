@@ -366,6 +366,22 @@ std::string interval_note(const JointProblem& problem, const NoiseCheck& noise,
          which_are_wider(found, problem.variables()) + ").";
 }
 
+namespace {
+
+/// " hangs on ...": what of a parameter that is held, a number that is, or a path makes most of a deviation.
+std::string hangs_on(const SystematicShift& shift) {
+  const std::string what = shift.name.substr(std::string("held ").size());
+  if (!shift.axes.empty())
+    return " hangs on how well the " + what + " is known: the table says what it moves. Measure it better" +
+           (what.ends_with(" offset") ? ", or fit it (/fit/path_deviations fit)." : ".");
+  if (shift.rms_px > 0)
+    return " hangs on the " + what + ", which is held: the table says what it moves. Measure it.";
+  return " hangs on a parameter that is held, " + what +
+         ": the table says what it moves. Fit it too, or measure it.";
+}
+
+}  // namespace
+
 void add_systematic_notes(const FitCase& options, FitResult& result) {
   if (!options.discretisation_check)
     result.notes.push_back(
@@ -373,11 +389,11 @@ void add_systematic_notes(const FitCase& options, FitResult& result) {
         "take the elements and steps for exact.");
   if (result.systematic.empty()) return;
   result.notes.push_back(
-      "Systematic: the tracks were predicted again with each kind of step finer, and differentiated by "
-      "parameters that "
-      "are held but not known exactly; by what that would move a parameter, to first order, its interval is "
-      "wider, 1.96 "
-      "times each, in squares.");
+      "Systematic: the tracks were predicted again with each kind of step finer and with numbers of the "
+      "scene "
+      "that are held but not known exactly off by their deviation, and differentiated by parameters that are "
+      "held and by where paths are; by what that would move a parameter, to first order, its interval is "
+      "wider, 1.96 times each, in squares.");
   for (std::size_t k = 0; k < result.parameters.size(); ++k) {
     const FittedParameter& p = result.parameters[k];
     const SystematicShift* largest = nullptr;
@@ -386,11 +402,7 @@ void add_systematic_notes(const FitCase& options, FitResult& result) {
       if (!shift.failure.empty()) continue;
       if (shift.is_held()) {
         if (shift.shift[k] * shift.shift[k] > 0.5 * p.sigma * p.sigma)
-          result.cannot_tell.push_back(
-              shift.axes.empty() ? p.name + " hangs on a parameter that is held, " + shift.name.substr(5) +
-                                       ": the table says what it moves. Fit it too, or measure it."
-                                 : p.name + " hangs on how well the " + shift.name.substr(5) +
-                                       " is known: the table says what it moves. Measure it better.");
+          result.cannot_tell.push_back(p.name + hangs_on(shift));
         continue;
       }
       finer += shift.shift[k] * shift.shift[k];

@@ -10,6 +10,7 @@
 
 #include "sim/core/csv_reader.h"
 #include "sim/core/error.h"
+#include "sim/scene/located_json.h"
 
 namespace rhytid::fitting {
 namespace {
@@ -96,13 +97,18 @@ std::size_t knots_seen(const ColliderScene& collider, const TimeScene& time, int
   return std::min(count, collider.path.size());
 }
 
+/// As the scene's parameters have it.
+std::string path_address(const ColliderScene& collider) {
+  return "/colliders/" + escape_key(collider.name) + "/path";
+}
+
 /// All modes of one collider's path, of `clip`.
 class PathModes {
  public:
   PathModes(const ColliderScene& collider, std::string clip, std::size_t knots, const PathDeviations& known)
       : collider_(collider), clip_(std::move(clip)) {
     for (const Vec3& axis : axes_of(known.shared)) add_shared(axis);
-    for (std::size_t k = 0; k < knots; ++k)
+    for (std::size_t k = 0; k < std::min(knots, known.own.size()); ++k)
       for (const Vec3& axis : axes_of(known.own[k])) {
         FitParameter& p = parameter("knot_error/" + std::to_string(own.size()), own);
         p.group = group() + " by knot";
@@ -114,18 +120,20 @@ class PathModes {
   std::string group() const { return collider_.name + " path" + (clip_.empty() ? "" : " (" + clip_ + ")"); }
 
  private:
-  void add_shared(const Vec3& axis) {
+  void add_shared(Vec3 axis) {
     FitParameter& p = parameter("offset/" + std::to_string(shared.size()), shared);
     Eigen::Index along = 0;
     axis.cwiseAbs().maxCoeff(&along);
+    if (axis[along] < 0) axis = -axis;
+    const bool is_along = std::fabs(axis[along]) > 0.999 * axis.norm();
     p.group = group() + " offset";
     p.name = collider_.name + " path offset " + std::to_string(shared.size()) + " (" +
-             two_digits(axis.norm()) + " mm, mostly " + "xyz"[along] + ")";
+             two_digits(axis.norm()) + " mm, " + (is_along ? "" : "mostly ") + "xyz"[along] + ")";
     for (std::size_t k = 0; k < collider_.path.size(); ++k) add(axis, k, p);
   }
   FitParameter& parameter(const std::string& what, std::vector<FitParameter>& list) const {
     FitParameter& p = list.emplace_back();
-    p.address = "/colliders/" + collider_.name + "/path/" + what;
+    p.address = path_address(collider_) + "/" + what;
     p.name = collider_.name + " path " + what;
     p.clip = clip_;
     p.initial = 0, p.lower = -kReach, p.upper = kReach, p.transform = ParameterTransform::none;
@@ -135,9 +143,8 @@ class PathModes {
   void add(const Vec3& axis, std::size_t knot, FitParameter& p) const {
     for (int a = 0; a < 3; ++a)
       if (axis[a] != 0)
-        p.moves.emplace_back("/colliders/" + collider_.name + "/path/" + std::to_string(knot) + "/position/" +
-                                 std::to_string(a),
-                             axis[a]);
+        p.moves.emplace_back(
+            path_address(collider_) + "/" + std::to_string(knot) + "/position/" + std::to_string(a), axis[a]);
   }
 
   const ColliderScene& collider_;
@@ -149,7 +156,7 @@ void release(const std::vector<FitParameter>& modes, const std::string& clip, Sc
   for (ColliderScene& collider : scene.colliders)
     for (const FitParameter& p : modes)
       if (!p.moves.empty() && (p.clip.empty() || p.clip == clip) &&
-          p.address.starts_with("/colliders/" + collider.name + "/path/"))
+          p.address.starts_with(path_address(collider) + "/"))
         collider.path_file.clear();
 }
 
@@ -180,46 +187,109 @@ std::optional<PathDeviations> read_path_deviations(const std::string& file) {
   return found;
 }
 
+namespace {
+
+/// What is known of a path, and in words who says so.
+struct KnownPath {
+  PathDeviations deviations;
+  std::string source;
+  bool is_guessed = false;  ///< by default
+};
+
+/// Whether the fit has knots of the path among its parameters, in that direction.
+bool fits_knots(const JointFitInput& input, const std::string& clip, const ColliderScene& collider,
+                int axis) {
+  const std::string path = path_address(collider) + "/", end = "/position/" + std::to_string(axis);
+  return std::any_of(
+      input.options.parameters.begin(), input.options.parameters.end(), [&](const FitParameter& p) {
+        return (p.clip.empty() || p.clip == clip) && p.address.starts_with(path) && p.address.ends_with(end);
+      });
+}
+
+PathDeviations alike(double sigma) {
+  return {.shared = sigma * sigma * Mat3::Identity(), .own = {}};
+}
+
+/// What the case says of a path, of this clip before what it says of all.
+const ConsideredQuantity* path_of_case(const FitCase& fit, const std::string& clip,
+                                       const ColliderScene& collider) {
+  const ConsideredQuantity* found = nullptr;
+  for (const ConsideredQuantity& q : fit.consider_paths)
+    if (q.address == path_address(collider) && (q.clip == clip || (q.clip.empty() && found == nullptr)))
+      found = &q;
+  return fit.consider ? found : nullptr;
+}
+
+/// By the case, by its file, by default. Nothing: it is taken for exact.
+std::optional<KnownPath> known_path(const JointFitInput& input, const std::string& clip,
+                                    const ColliderScene& collider) {
+  if (const ConsideredQuantity* q = path_of_case(input.options, clip, collider)) {
+    if (!(q->sigma > 0)) return std::nullopt;
+    return KnownPath{alike(q->sigma), "as the case says (/fit/consider)"};
+  }
+  if (!collider.path_file.empty())
+    if (const auto stated = read_path_deviations(collider.path_file)) {
+      if (stated->own.size() != collider.path.size())  // the file has changed since the scene was read
+        throw InputError(collider.path_file, std::to_string(stated->own.size()) + " knots",
+                         std::to_string(collider.path.size()) + " as the scene has");
+      return KnownPath{*stated, ""};
+    }
+  if (input.options.consider) return std::nullopt;
+  KnownPath known{alike(kPathSigma), "by default, since nothing states its deviations", true};
+  for (int a = 0; a < 3; ++a)
+    if (fits_knots(input, clip, collider, a)) known.deviations.shared(a, a) = 0;
+  if (known.deviations.shared.isZero(0)) return std::nullopt;
+  return known;
+}
+
+/// "0.015 mm for all knots alike and to 0.002 mm for each by itself (the largest deviations in any direction)".
+std::string in_words(const KnownPath& known) {
+  std::string text = two_digits(largest_sigma(known.deviations.shared)) + " mm for all knots alike";
+  double own = 0;
+  for (const Mat3& of_knot : known.deviations.own) own = std::max(own, largest_sigma(of_knot));
+  if (!known.deviations.own.empty())
+    text += " and to " + two_digits(own) + " mm for each by itself (the largest deviations in any direction)";
+  else
+    text += " in each direction";
+  return text + (known.source.empty() ? "" : ", " + known.source);
+}
+
+}  // namespace
+
 JointFitInput with_path_errors(const JointFitInput& input) {
   JointFitInput out = input;
-  if (input.options.path_deviations != "consider" && input.options.path_deviations != "fit" &&
-      input.options.path_deviations != "ignore")
-    throw InputError("fit: path_deviations", "'" + input.options.path_deviations + "'",
-                     "consider, fit or ignore");
-  const bool fits = input.options.path_deviations == "fit";
+  const std::string& use = input.options.path_deviations;
+  if (use != "consider" && use != "fit" && use != "ignore")
+    throw InputError("fit: path_deviations", "'" + use + "'", "consider, fit or ignore");
   std::vector<FitParameter> fitted;
   for (const FitClip& clip : input.clips) {
     const std::string of_clip = input.clips.size() > 1 ? clip.name : "";
     const int last = input.options.last_frame > 0 ? std::min(input.options.last_frame, clip.scene.time.frames)
                                                   : clip.scene.time.frames;
     for (const ColliderScene& collider : clip.scene.colliders) {
-      if (collider.path_file.empty()) continue;
+      if (collider.path.empty()) continue;
       const std::string file = std::filesystem::path(collider.path_file).filename().string();
-      const std::string which =
-          "The path of " + collider.name + (of_clip.empty() ? "" : " in clip " + of_clip) + " (" + file + ")";
-      const std::optional<PathDeviations> known = read_path_deviations(collider.path_file);
+      const std::string which = "The path of " + collider.name +
+                                (of_clip.empty() ? "" : " in clip " + of_clip) +
+                                (file.empty() ? "" : " (" + file + ")");
+      const std::optional<KnownPath> known = known_path(input, clip.name, collider);
       if (!known) {
-        out.path_notes.push_back(which + " states no deviations: it is taken for exact.");
+        if (!file.empty()) out.path_notes.push_back(which + " states no deviations: it is taken for exact.");
         continue;
       }
-      double own = 0;
-      for (const Mat3& of_knot : known->own) own = std::max(own, largest_sigma(of_knot));
-      const std::string size = " is known to " + two_digits(largest_sigma(known->shared)) +
-                               " mm for all knots alike and to " + two_digits(own) +
-                               " mm for each by itself (the largest deviations in any direction): ";
-      if (input.options.path_deviations == "ignore") {
+      const std::string size = " is known to " + in_words(*known) + ": ";
+      if (use == "ignore") {
         out.path_notes.push_back(which + size + "not used, as the case asks (/fit/path_deviations).");
         continue;
       }
-      if (known->own.size() != collider.path.size())  // the file has changed since the scene was read
-        throw InputError(collider.path_file, std::to_string(known->own.size()) + " knots",
-                         std::to_string(collider.path.size()) + " as the scene has");
-      PathModes modes(collider, of_clip, knots_seen(collider, clip.scene.time, last), *known);
-      const bool fits_here = fits && !modes.shared.empty();
+      PathModes modes(collider, of_clip, knots_seen(collider, clip.scene.time, last), known->deviations);
+      for (FitParameter& p : modes.shared) p.is_guessed = known->is_guessed;
+      const bool fits_here = use == "fit" && !modes.shared.empty();
       out.path_notes.push_back(which + size +
                                (fits_here ? "the offset is fitted with that as its prior, what knots err by "
                                             "themselves is considered."
-                                          : "what that would move is considered."));
+                                : known->is_guessed ? "what the residuals leave of that is considered."
+                                                    : "what that would move is considered."));
       auto& of_shared = fits_here ? fitted : out.path_errors;
       of_shared.insert(of_shared.end(), modes.shared.begin(), modes.shared.end());
       out.path_errors.insert(out.path_errors.end(), modes.own.begin(), modes.own.end());

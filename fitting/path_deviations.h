@@ -13,6 +13,14 @@
 // Paths of several clips count as independent, from the same file too. How the finger turns, and where it is between
 // knots, counts as known.
 //
+// Where a path states none, /fit/consider may say of "/colliders/NAME/path" how well it is known in each direction,
+// all knots alike; where the case has no /fit/consider either, that is kPathSigma. An outline of a ball that is read to a
+// pixel or two of 0.05 to 0.1 mm, and a pose of the camera that is off by as much, leave a quarter of a millimetre;
+// so does the pad of a finger, which is no rigid ball. As a guess it does not count in full: with s_a ~ N(0, 1) before, what
+// the residuals leave of it, E[s sᵀ | z] (residual_signature.h), takes the place of the identity. A finger that is
+// off by more than the guess then widens by what the residuals say, and one that is where it should be by little. Deviations that
+// are stated count as stated. Directions in which the case fits knots are theirs.
+//
 // Tests: tests/fitting/path_deviations_test.cpp
 #pragma once
 
@@ -24,6 +32,9 @@
 
 namespace rhytid::fitting {
 
+/// Deviation that where a path is is taken to have in each direction where neither it nor the case says so, mm.
+inline constexpr double kPathSigma = 0.25;
+
 struct PathDeviations {
   Mat3 shared = Mat3::Zero();  ///< mm²
   std::vector<Mat3> own;       ///< mm², by knot
@@ -33,8 +44,8 @@ struct PathDeviations {
 /// only, and for what is no covariance.
 std::optional<PathDeviations> read_path_deviations(const std::string& file);
 
-/// The input with `path_errors` of all colliders whose path_file states deviations, up to the last frame that is
-/// compared, those that are to be fitted among the parameters instead, and `path_notes` about them.
+/// The input with `path_errors` of all colliders whose path is known to some deviation, those of its path_file up to the
+/// last frame that is compared, those that are to be fitted among the parameters instead, and `path_notes` about them.
 JointFitInput with_path_errors(const JointFitInput& input);
 
 /// Notes on which of `path_errors` the shifts of the result hold, and so its intervals, and which they do not.

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -51,6 +52,52 @@ class CaseTest : public testing::Test {
 
   fs::path folder_;
 };
+
+TEST_F(CaseTest, ConsidersParametersNumbersAndPaths) {
+  EXPECT_FALSE(load_case(write("case.json", R"({"scene": "scene.json"})")).fit.consider);
+  const Case c = load_case(write("case.json", R"({"scene": "scene.json", "fit": {"consider": [
+      {"address": "/colliders/finger/friction/coefficient", "sigma": 0.2},
+      {"address": "/base/stiffness", "relative": 0.5},
+      {"address": "/colliders/0/path/1/position/2", "sigma": "50 um"},
+      {"address": "/skin/layers/0/thickness", "relative": 0.1},
+      {"address": "/base/onset", "sigma": "2 um"},
+      {"address": "/colliders/0/path", "sigma": 0.3}]}})"));
+  ASSERT_TRUE(c.fit.consider);
+  ASSERT_EQ(c.fit.consider->size(), 3u);
+  EXPECT_EQ((*c.fit.consider)[0].prior_sigma, 0.2);
+  EXPECT_NEAR(*(*c.fit.consider)[1].prior_sigma, std::log(1.5), 1e-12);
+  EXPECT_EQ((*c.fit.consider)[2].prior_sigma, 0.05);
+  ASSERT_EQ(c.fit.consider_quantities.size(), 2u);
+  EXPECT_EQ(c.fit.consider_quantities[0].address, "/skin/layers/soft/thickness");
+  EXPECT_EQ(c.fit.consider_quantities[0].sigma, 0.1);
+  EXPECT_TRUE(c.fit.consider_quantities[0].is_relative);
+  EXPECT_EQ(c.fit.consider_quantities[1].sigma, 0.002);
+  EXPECT_FALSE(c.fit.consider_quantities[1].is_relative);
+  ASSERT_EQ(c.fit.consider_paths.size(), 1u);
+  EXPECT_EQ(c.fit.consider_paths[0].address, "/colliders/finger/path");
+  EXPECT_EQ(c.fit.consider_paths[0].sigma, 0.3);
+}
+
+TEST_F(CaseTest, ConsiderSaysWhatItCannot) {
+  const auto error = [this](const std::string& item) {
+    return error_of(R"({"scene": "scene.json", "fit": {"consider": [)" + item + "]}}");
+  };
+  EXPECT_THAT(error(R"({"address": "/skin/layers/soft/thicknes", "relative": 0.1})"),
+              AllOf(HasSubstr("case.json:1: /fit/consider/0/address: got \"/skin/layers/soft/thicknes\""),
+                    HasSubstr("nearest is /skin/layers/soft/thickness")));
+  EXPECT_THAT(error(R"({"address": "/skin/layers/soft/thickness"})"),
+              HasSubstr("got neither \"sigma\" nor \"relative\""));
+  EXPECT_THAT(error(R"({"address": "/skin/layers/soft/thickness", "sigma": "3 kPa"})"),
+              AllOf(HasSubstr("/fit/consider/0/sigma: got \"3 kPa\""), HasSubstr("a length")));
+  EXPECT_THAT(error(R"({"address": "/skin/layers/soft/thickness", "sigma": -0.1})"),
+              HasSubstr("/fit/consider/0/sigma: got -0.1, expected a deviation >= 0"));
+  EXPECT_THAT(error(R"({"address": "/skin/layers/soft/poissons_ratio", "relative": 0.1})"),
+              AllOf(HasSubstr("/fit/consider/0/relative"), HasSubstr("expected sigma")));
+  EXPECT_THAT(error(R"({"address": "/base/normal/0", "relative": 0.1})"), HasSubstr("the value is not > 0"));
+  EXPECT_THAT(error(R"({"address": "/colliders/finger/path", "relative": 0.1})"), HasSubstr("sigma, in mm"));
+  EXPECT_THAT(error(R"({"address": "/skin/surface/crop/radius", "relative": 0.1})"),
+              HasSubstr("expected a number of the scene, nearest is"));
+}
 
 TEST_F(CaseTest, SettingsGrowByTheNumberBehindTheLast) {
   const std::string path = write("case.json", R"({"scene": "scene.json"})");

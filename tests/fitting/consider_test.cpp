@@ -49,6 +49,8 @@ TEST(Consider, FrictionThatIsNotFittedByDefault) {
   list = considered_parameters(input);
   ASSERT_EQ(list.size(), 1u);
   EXPECT_EQ(list[0].address, "/base/stiffness");
+  input.options.consider->back().prior_sigma = 0;
+  EXPECT_TRUE(considered_parameters(input).empty()) << "it is exact";
   input.options.parameters.clear();
   input.options.consider.emplace();
   EXPECT_TRUE(considered_parameters(input).empty()) << "the case says so";
@@ -84,6 +86,10 @@ TEST(Consider, ShiftIsWhatAnotherHeldValueMakesOfTheAnswer) {
 // Friction held a sixth too low: without considering it the interval of the film misses the truth.
 TEST(Consider, IntervalsHoldTheTruthWhereFrictionIsHeldWrong) {
   FitInput input = make_input(0.34);
+  input.options.path_deviations = "ignore";
+  FitParameter friction = test::fitted(kFriction);
+  friction.prior_sigma = kFrictionSigma;
+  input.options.consider = {{friction}};
   const FitResult with = run_fit(input);
   std::printf("%s", answer_text(with).c_str());
   input.options.consider.emplace();

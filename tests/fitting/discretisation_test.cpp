@@ -28,6 +28,7 @@ FitInput make_input(const std::vector<std::string>& settings, const std::vector<
   const Camera camera = test::make_camera();
   FitCase fit;
   fit.min_sigma = 0.005;
+  fit.consider.emplace();  // elements and steps alone
   fit.parameters = {test::fitted("/skin/layers/film/youngs_modulus", 0.9),
                     test::fitted("/colliders/finger/friction/coefficient", 0.75)};
   return {test::drag_scene(kFrames, settings),

@@ -47,6 +47,9 @@ FitResult example() {
   r.measured = {{1, 3, "force_finger_x", 0.25, 1. / 3, 0.3}};
   r.systematic = {{"plane", "order 4", "", 0.25, 1.5, {0.1, -1. / 3}},
                   {"steps", "finer", "no end", 0, 2, {}}};
+  r.systematic[0].signature = {{"finger path x", "mm", 0.25, 1. / 3, 1e-17}};
+  r.systematic[0].explained = 100. / 3;
+  r.misfit = {"the model misses something"};
   r.history = {{0, 1, 10, 1, 0, 0.5, {1, 2}}, {1, 3, 1. / 7, 1e-3, 0.2, 1.5, {1.1, nan_value}}};
   r.singular_values = VectorXd::LinSpaced(2, 3.3, 0.1);
   r.right_vectors = MatrixXd::Identity(2, 2);
@@ -104,6 +107,15 @@ TEST(FitResult, ReadsBackBitForBit) {
   ASSERT_EQ(s.systematic.size(), 2u);
   EXPECT_EQ(s.systematic[0].shift, r.systematic[0].shift);
   EXPECT_EQ(s.systematic[0].change, "order 4");
+  ASSERT_EQ(s.systematic[0].signature.size(), 1u);
+  EXPECT_EQ(s.systematic[0].signature[0].name, "finger path x");
+  EXPECT_EQ(s.systematic[0].signature[0].unit, "mm");
+  EXPECT_EQ(s.systematic[0].signature[0].amount, 0.25);
+  EXPECT_EQ(s.systematic[0].signature[0].estimate, 1. / 3);
+  EXPECT_EQ(s.systematic[0].signature[0].sigma, 1e-17);
+  EXPECT_EQ(s.systematic[0].explained, 100. / 3);
+  EXPECT_TRUE(s.systematic[1].signature.empty());
+  EXPECT_EQ(s.misfit, r.misfit);
   EXPECT_EQ(s.systematic[1].failure, "no end");
   EXPECT_TRUE(s.systematic[1].shift.empty());
   EXPECT_EQ(s.history[1].cost, 1. / 7);

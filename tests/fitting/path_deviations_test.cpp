@@ -136,6 +136,51 @@ TEST_F(PathDeviationsTest, AreOfKnotsThatTheFitSees) {
   EXPECT_TRUE(with_path_errors(input).path_errors.empty());
 }
 
+// A path in the scene, or in a file that states nothing.
+TEST_F(PathDeviationsTest, ThatNothingStatesAreThoseOfTheCaseOrTheDefault) {
+  JointFitInput input{.clips = {{"", "", test::drag_scene(kFrames), {}, {}, {}}}, .options = {}};
+  const auto offsets = [&input] { return with_path_errors(input).path_errors; };
+  ASSERT_EQ(offsets().size(), 3u);
+  const FitParameter z = offsets()[0];
+  EXPECT_EQ(z.name, "finger path offset 1 (0.25 mm, z)");
+  EXPECT_EQ(z.group, "finger path offset");
+  ASSERT_EQ(z.moves.size(), 3u) << "all knots alike";
+  EXPECT_EQ(z.moves[2].first, "/colliders/finger/path/2/position/2");
+  EXPECT_EQ(z.moves[2].second, kPathSigma);
+  EXPECT_THAT(with_path_errors(input).path_notes,
+              Contains(HasSubstr("is known to 0.25 mm for all knots alike in each direction, by default")));
+  input.options.parameters = {test::fitted("/colliders/finger/path/1/position/2")};
+  EXPECT_EQ(offsets().size(), 2u) << "z is fitted";
+  input.options.parameters.clear();
+  input.options.path_deviations = "ignore";
+  EXPECT_TRUE(offsets().empty());
+  input.options.path_deviations = "fit";
+  EXPECT_EQ(with_path_errors(input).options.parameters.size(), 3u);
+  input.options.path_deviations = "consider";
+  input.options.consider.emplace();
+  EXPECT_TRUE(offsets().empty()) << "the case says that all is exact";
+  input.options.consider_paths = {{.address = "/colliders/finger/path", .sigma = 0.1}};
+  ASSERT_EQ(offsets().size(), 3u);
+  EXPECT_EQ(offsets()[0].moves[0].second, 0.1);
+  input.clips[0].name = "a";
+  input.options.consider_paths.insert(input.options.consider_paths.begin(),
+                                      {.address = "/colliders/finger/path", .clip = "a", .sigma = 0});
+  EXPECT_TRUE(offsets().empty()) << "of its clip";
+  input.clips[0].name = "b";
+  EXPECT_EQ(offsets().size(), 3u) << "of another clip";
+  input.options.consider_paths = {{.address = "/colliders/finger/path", .sigma = 0}};
+  EXPECT_TRUE(offsets().empty());
+
+  const Scene of_file =
+      test::drag_scene(kFrames, {"/colliders/finger/path=null",
+                                 "/colliders/finger/path_file=" + written("time,x,y,z\n0,1,2,9\n1,1,2,9\n")});
+  input = {.clips = {{"", "", of_file, {}, {}, {}}}, .options = {}};
+  EXPECT_EQ(offsets().size(), 3u);
+  input.options.consider.emplace();
+  EXPECT_TRUE(offsets().empty());
+  EXPECT_THAT(with_path_errors(input).path_notes, Contains(HasSubstr("taken for exact")));
+}
+
 TEST_F(PathDeviationsTest, MakeIntervalsHoldTheTruthThatTheyMissedBefore) {
   int with = 0, without = 0, all = 0;
   for (unsigned seed = 1; seed <= 4; ++seed) {
@@ -167,7 +212,7 @@ TEST_F(PathDeviationsTest, AreConsideredWhereObservationsAreFewerThanKnots) {
   input.options.consider.reset();
   input.tracks.tracks.resize(2);  // 16 numbers in 4 frames for 2 parameters, and 18 + 1 that are held
   const FitResult found = run_fit(input);
-  ASSERT_EQ(found.systematic.size(), 3u);
+  ASSERT_EQ(found.systematic.size(), 5u);  // and the layers' thicknesses
   for (const SystematicShift& shift : found.systematic) EXPECT_EQ(shift.failure, "") << shift.name;
 }
 

@@ -75,10 +75,11 @@ void add_discretisation(HtmlPage& page, const ReportData& data) {
                         : ""));
   }
   page.paragraph(
-      "At the answer the tracks were predicted again with each kind of step of the discretisation finer, and "
-      "differentiated by parameters that are held without being known exactly. To first order the answer "
-      "would move "
-      "by what the table says; the intervals have room for it.");
+      "At the answer the tracks were predicted again with each kind of step of the discretisation finer and "
+      "with numbers of the scene that are held without being known exactly off by their deviation, and "
+      "differentiated by parameters that are held so and by where paths are. To first order the answer would "
+      "move by what the table says; the intervals have room for it.");
+  for (const std::string& sentence : fit.misfit) page.paragraph("Misfit: " + sentence);
   page.list(list);
   if (run.empty()) return;
   HtmlTable table;

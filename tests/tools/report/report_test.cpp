@@ -88,6 +88,7 @@ TEST(Report, HoldsTheWholeFit) {
 
   EXPECT_THAT(html,
               HasSubstr("order 4 in the plane instead of 3, which moves the predicted points by 0.11 px"));
+  EXPECT_THAT(html, HasSubstr("Misfit: Residuals are 1.1 times"));
   EXPECT_THAT(html, HasSubstr(">+9.4 %<"));  // left strength: exp(0.09)
   EXPECT_THAT(html, AllOf(HasSubstr("another camera 45° up"), HasSubstr("0.62")));
   EXPECT_THAT(html, HasSubstr("force_finger_z [N]"));
