@@ -14,9 +14,9 @@ namespace rhytid::adjoint {
 
 namespace {
 
-// A deep remainder is looked at again this much closer, and is the gradient's error when it is smaller by as much,
-// but for this; of a remainder of second order it would be the square.
-constexpr double kCloseBy = 0.8, kProportional = 0.1;
+// A deep remainder is looked at again this much closer, and is noise when c₁h + c₂h², with c₂ of the last step before and
+// c₁ from the deep one, misses it by more than this share of its larger part.
+constexpr double kCloseBy = 0.8, kSmooth = 0.1;
 constexpr double kNoiseStep = 1e-8;  // h² is then below rounding, yet the solver has work to do
 
 /// Whether the last `count` slopes lie in the window.
@@ -195,11 +195,15 @@ TaylorSeries taylor_test(const FunctionalDifference& functional, const Parameter
     if (deep < h / 8 && evaluate(deep)) {
       ++wanted;
       if (!is_clean(series, options, 1)) {
-        // What an error of the gradient leaves is proportional to h. One run that ended at a residual far above those
-        // that the noise was measured from is not; nor may this one start from it, or it would inherit its end.
+        // What an error of the gradient leaves is a smooth function of h. One run that ended at a residual far above
+        // those that the noise was measured from is not; nor may this one start from it, or it would inherit its end.
+        const double d = deep, c2 = series.remainders[series.remainders.size() - 2] / (h * h),
+                     c1 = series.remainders.back() / d - c2 * d;
+        const double smooth = kCloseBy * d * c1 + kCloseBy * kCloseBy * d * d * c2;
         last = {};
         const auto [again, switches] = at(kCloseBy * deep);
-        if (failure.empty() && !(std::fabs(again / series.remainders.back() - kCloseBy) < kProportional)) {
+        if (failure.empty() &&
+            !(std::fabs(again - smooth) <= kSmooth * std::max(std::fabs(c1) * d, std::fabs(c2) * d * d))) {
           series.noise = std::max({series.noise, std::fabs(series.remainders.back()), std::fabs(again)});
           series.steps.pop_back();
           series.slopes.pop_back();

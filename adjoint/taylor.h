@@ -5,7 +5,7 @@
 // Q is evaluated by solving every step again (resimulate.h). The step h starts at the largest of the series
 // and is halved until three neighbouring slopes d ln ρ / d ln h lie in the window, or ρ has sunk to the noise
 // of Q; then once more at an h as small as the noise allows, which bounds the error of Q'v. When that one is out of
-// line and does not shrink in proportion to h either, as what an error of Q'v leaves would, it is noise that was not
+// line and not on a smooth curve with its neighbours either, as what an error of Q'v leaves would be, it is noise not
 // measured before: it counts as such, and the last h is chosen anew. Contact and
 // friction are only piecewise smooth: points that change piece between p and p + hv bend the parabola, so
 // they are counted, and small h are needed where they are many.

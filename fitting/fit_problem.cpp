@@ -50,9 +50,13 @@ SkinMesh first_frame_mesh(const SceneModel& model, const RunOptions& options) {
   return mesh;
 }
 
-/// Relative tolerances of the minimiser above this have their steps polished: below it derivatives are right to some
-/// 1e-9 without, far better than the tracks that they explain, and a polish costs every pass of a step a factor.
-constexpr double kPolishAbove = 1e-8;
+/// Whether derivatives need steps to be polished: at the default tolerances they are right to 1e-9 without, far better
+/// than the tracks that they explain, and a polish costs every pass of a step a factor.
+bool needs_polish(const MinimiserOptions& options) {
+  const MinimiserOptions usual;
+  return options.relative_tolerance > usual.relative_tolerance ||
+         options.absolute_tolerance > usual.absolute_tolerance;
+}
 
 }  // namespace
 
@@ -66,7 +70,7 @@ FitProblem::FitProblem(const Scene& scene, const FitCase& fit, const std::vector
   options_.frames = last_used_frame(scene, fit);
   options_.keep_states = true;
   // The error of a derivative is of the order of the tolerance, or of its square after a polish.
-  options_.minimiser.polish = options_.minimiser.relative_tolerance > kPolishAbove;
+  options_.minimiser.polish = needs_polish(options_.minimiser);
   if (options_.frames < 1) throw InputError("fit: frames", "0", "a scene with at least one frame after rest");
   require_names(cameras, tracks);
   const SkinMesh seen_first = first_frame_mesh(model_, options_);

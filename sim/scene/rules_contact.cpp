@@ -313,7 +313,7 @@ std::vector<Rule> run_rules() {
        .fallback = solver.factor_precision,
        .options = {"automatic", "full", "mixed"},
        .doc =
-           "mixed: the iterations go by factors in single precision, corrected in double; certificate, "
+           "mixed: the iterations go by factors in single precision, corrected in double; "
            "derivatives and lbfgs_literal have double precision in any case. automatic: mixed where factors "
            "are large."},
       {.pointer = "/output", .type = object, .fallback = json::object(), .doc = "What is written."},

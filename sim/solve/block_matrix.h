@@ -73,7 +73,7 @@ class CholeskyFactor {
                                Precision precision = Precision::full);
   bool usable() const;
   Precision precision() const;  ///< of the last factorisation
-  /// Solves A X = B for [num_unknowns][k] right-hand sides, unpermuted order.
+  /// Solves A X = B for [num_unknowns][k] right-hand sides, unpermuted order; by several threads at once if need be.
   MatrixXd solve(const MatrixXd& rhs) const;
   /// The same with one step of iterative refinement against `matrix`, which must be the matrix factorised.
   MatrixXd solve(const BlockMatrix& matrix, const MatrixXd& rhs) const;

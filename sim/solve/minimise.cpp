@@ -22,9 +22,10 @@ constexpr int kMaxLineSearchFailures = 4;  // in a row, each with a more cautiou
 constexpr int kRawPatience = 5, kPatience = 20;
 constexpr int kMaxNegativeCurvatureExits = 10;
 constexpr double kLbfgsRefreshStep = 1e-6;  // the publication, "Non-Linear Solver"
-// A whole step of Newton's to the tolerance that leaves at most this share of the residual: over it the Hessian hardly
-// changes, so that its factor at the step's start is the certificate of its end.
-constexpr double kCertifyingStep = 0.1;
+// A whole step of Newton's to the tolerance whose start vouches for its end: it leaves at most this share of the
+// residual, and began so near the equilibrium (residual over the force scale) that it is far too short to pass a
+// critical load. From further away a straight path may lead past one without a trace in the residual.
+constexpr double kCertifyingStep = 0.1, kCertifyingResidual = 1e-4;
 constexpr unsigned kNegativeCurvatureSeed = 20240229;
 
 class Minimisation {
@@ -310,7 +311,8 @@ MinimiserStatus Minimisation::newton() {
     shift_ = kShift;
     const double before = report_.residual;
     const bool keep = options_.keep_factor && raw && found.step == 1 && found.next.gradient.norm() <= before;
-    const bool certifies = !options_.polish && raw && found.step == 1;
+    const bool certifies = !options_.polish && raw && found.step == 1 &&
+                           before <= kCertifyingResidual * objective_.force_scale();
     LbfgsMemory memory(options_.lbfgs_memory);
     if (keep) memory.add(found.next.q - at_.q, found.next.gradient - at_.gradient);
     if (const auto stop = accept(std::move(found.next))) return *stop;

@@ -107,13 +107,13 @@ using IterationCallback = std::function<bool(int iteration, double energy, doubl
 /// What the factor holds that minimise() is given.
 enum class GivenFactor {
   none,
-  /// The factor of a nearby problem's Hessian near the start: `newton` begins with steps of L-BFGS over it while they pay.
+  /// That of a nearby Hessian, raw or projected: `newton` begins with steps of L-BFGS over it while they pay.
   near
 };
 
 /// Minimises from q (in/out). On return with status converged and certify_minimum, `factor` holds the raw
-/// Hessian's factor and `matrix` the raw Hessian, at the solution or one step before it (a polish, or Newton's last
-/// when it ended at the tolerance and left a tenth of the residual or less).
+/// Hessian's factor (in single precision where that steered and no polish followed) and `matrix` the raw Hessian, at the
+/// solution or one step before it: a polish, or a last step of Newton's that began within 1e-4 of the force scale.
 /// `lbfgs` hands over to Newton when its gradient test holds (certificate) or when it can go no further;
 /// `lbfgs_literal` ends there, with the last projected factor.
 [[nodiscard]] MinimiserReport minimise(Objective& objective, VectorXd& q, const MinimiserOptions& options,

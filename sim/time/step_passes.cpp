@@ -61,7 +61,8 @@ MinimiserReport StepSolver::solve_softened(const StepInfo& step, const State& ol
                                            const IterationCallback& callback) {
   problem_.emplace(*model_, *native_, step, old);
   VectorXd q;
-  MinimiserReport first = solve_step_softened(*problem_, options_, factor_, matrix_, q, callback);
+  MinimiserReport first = solve_step_softened(*problem_, passes_ > 1 ? earlier_options_ : options_, factor_,
+                                              matrix_, q, callback);
   return solve_later_passes(step, std::move(first), q, q, callback);
 }
 
@@ -77,8 +78,10 @@ MinimiserReport StepSolver::solve_later_passes(const StepInfo& step, MinimiserRe
     problem_.reset();  // it refers to lagged_
     lagged_ = std::move(next);
     problem_.emplace(*model_, *native_, step, lagged_);
-    // Only what the friction is lagged from has changed.
-    MinimiserReport report = solve_pass(pass + 1, q, held, callback, GivenFactor::near);
+    // Only what the friction is lagged from has changed; a factor of another step would make the result depend on where
+    // a run began.
+    const GivenFactor given = total.factorisations > 0 ? GivenFactor::near : GivenFactor::none;
+    MinimiserReport report = solve_pass(pass + 1, q, held, callback, given);
     report.iterations += total.iterations;
     report.lbfgs_iterations += total.lbfgs_iterations;
     report.negative_curvature_exits += total.negative_curvature_exits;

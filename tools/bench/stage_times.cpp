@@ -226,7 +226,8 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
       [&] { positive = factor.factorize(matrix, 0, Precision::single) && positive; });
   // On stiff matrices single precision may fail; a run then corrects no direction by it either.
   if (!stopped && factor.usable()) {
-    // Where factors are in single precision every one gives a direction, and serves the iterations that have none.
+    // Where factors are in single precision every one gives a direction at most (some are certificates, or refused), and
+    // serves the iterations that have none.
     add({.name = "solve, single",
          .calls = single > 0 ? std::max(0., iterations - per_step(single)) : 0,
          .bytes = factor_bytes / 2},
