@@ -14,10 +14,30 @@ namespace rhytid::adjoint {
 
 namespace {
 
-// A deep remainder is looked at again this much closer, and is noise when c₁h + c₂h², with c₂ of the last step before and
-// c₁ from the deep one, misses it by more than this share of its larger part.
+// A deep remainder is looked at again this much closer, and is noise when c₁h + c₂h² misses it by more than this share
+// of its larger part (is_smooth).
 constexpr double kCloseBy = 0.8, kSmooth = 0.1;
 constexpr double kNoiseStep = 1e-8;  // h² is then below rounding, yet the solver has work to do
+
+/// Whether the last two remainders and one more, `again` at kCloseBy of the last step, lie on c₁h + c₂h²: what an error
+/// of the gradient leaves is a smooth function of h, a run that ended at a residual far above those that the noise was
+/// measured from is not. c₂ is that of the last remainder but one, where it dominates.
+bool is_smooth(const TaylorSeries& series, double again) {
+  const std::size_t n = series.remainders.size();
+  const double h = series.steps[n - 2], d = series.steps[n - 1], c2 = series.remainders[n - 2] / (h * h),
+               c1 = series.remainders[n - 1] / d - c2 * d;
+  const double expected = kCloseBy * d * c1 + kCloseBy * kCloseBy * d * d * c2;
+  return std::fabs(again - expected) <= kSmooth * std::max(std::fabs(c1) * d, std::fabs(c2) * d * d);
+}
+
+/// Takes the last remainder, and another beside it, for noise: removes it from the series.
+void raise_noise(TaylorSeries& series, double again) {
+  series.noise = std::max({series.noise, std::fabs(series.remainders.back()), std::fabs(again)});
+  series.steps.pop_back();
+  series.slopes.pop_back();
+  series.remainders.pop_back();
+  series.switches.pop_back();
+}
 
 /// Whether the last `count` slopes lie in the window.
 bool is_clean(const TaylorSeries& series, const TaylorOptions& options, int count) {
@@ -190,29 +210,24 @@ TaylorSeries taylor_test(const FunctionalDifference& functional, const Parameter
   if (failure.empty() && is_clean(series, options, wanted)) {
     // A small error of the gradient hides below a large parabola: once more as far down as the noise allows.
     const double curvature = std::fabs(series.remainders.back()) / (h * h);
-    const auto deepest = [&] { return std::max(h / 1024, std::sqrt(1e3 * series.noise / curvature)); };
-    const double deep = deepest();
-    if (deep < h / 8 && evaluate(deep)) {
-      ++wanted;
-      if (!is_clean(series, options, 1)) {
-        // What an error of the gradient leaves is a smooth function of h. One run that ended at a residual far above
-        // those that the noise was measured from is not; nor may this one start from it, or it would inherit its end.
-        const double d = deep, c2 = series.remainders[series.remainders.size() - 2] / (h * h),
-                     c1 = series.remainders.back() / d - c2 * d;
-        const double smooth = kCloseBy * d * c1 + kCloseBy * kCloseBy * d * d * c2;
-        last = {};
-        const auto [again, switches] = at(kCloseBy * deep);
-        if (failure.empty() &&
-            !(std::fabs(again - smooth) <= kSmooth * std::max(std::fabs(c1) * d, std::fabs(c2) * d * d))) {
-          series.noise = std::max({series.noise, std::fabs(series.remainders.back()), std::fabs(again)});
-          series.steps.pop_back();
-          series.slopes.pop_back();
-          series.remainders.pop_back();
-          series.switches.pop_back();
-          --wanted;
-          const double higher = deepest();
-          if (higher < h / 8 && evaluate(higher)) ++wanted;
-        }
+    const auto look_deeper = [&] {
+      const double deep = std::max(h / 1024, std::sqrt(1e3 * series.noise / curvature));
+      return deep < h / 8 && evaluate(deep);
+    };
+    // The remainder at the deepest step again a little closer. It may not start from the run there, or it would inherit
+    // its end.
+    const auto close_by = [&] {
+      last = {};
+      return at(kCloseBy * series.steps.back()).first;
+    };
+    if (look_deeper()) {
+      if (is_clean(series, options, 1)) {
+        ++wanted;
+      } else if (const double again = close_by(); !failure.empty() || is_smooth(series, again)) {
+        ++wanted;
+      } else {
+        raise_noise(series, again);
+        if (look_deeper()) ++wanted;
       }
     }
   }

@@ -5,47 +5,11 @@
 #include <exception>
 
 #include "sim/core/parallel.h"
-
-extern "C" {
-void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
-            const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
-            const double* beta, double* c, const int* ldc);
-void sgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
-            const float* alpha, const float* a, const int* lda, const float* b, const int* ldb,
-            const float* beta, float* c, const int* ldc);
-void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
-            const double* a, const int* lda, const double* beta, double* c, const int* ldc);
-void ssyrk_(const char* uplo, const char* trans, const int* n, const int* k, const float* alpha,
-            const float* a, const int* lda, const float* beta, float* c, const int* ldc);
-void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
-            const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
-void strsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
-            const int* n, const float* alpha, const float* a, const int* lda, float* b, const int* ldb);
-void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
-void spotrf_(const char* uplo, const int* n, float* a, const int* lda, int* info);
-}
+#include "sim/solve/blas.h"
 
 namespace rhytid {
 
 namespace {
-
-/// The BLAS of a scalar type.
-template <class Real>
-struct Blas;
-template <>
-struct Blas<double> {
-  static constexpr auto gemm = dgemm_;
-  static constexpr auto syrk = dsyrk_;
-  static constexpr auto trsm = dtrsm_;
-  static constexpr auto potrf = dpotrf_;
-};
-template <>
-struct Blas<float> {
-  static constexpr auto gemm = sgemm_;
-  static constexpr auto syrk = ssyrk_;
-  static constexpr auto trsm = strsm_;
-  static constexpr auto potrf = spotrf_;
-};
 
 constexpr int kPanelWidth = 128;
 // Subtrees of at most this share of all floating-point operations are one piece of work.
@@ -100,9 +64,7 @@ SupernodalCholesky::SupernodalCholesky(const Supernodes& supernodes) : supernode
 }
 
 void SupernodalCholesky::find_sources() {
-  std::vector<int> super_of(supernodes_.size());
-  for (int s = 0; s < supernodes_.count(); ++s)
-    std::fill(&super_of[supernodes_.first(s)], &super_of[0] + supernodes_.first(s + 1), s);
+  const std::vector<int> super_of = supernodes_.of_columns();
   // Visits (panel, source) for all pairs, sources ascending.
   const auto for_pairs = [&](auto&& visit) {
     for (int d = 0; d < supernodes_.count(); ++d) {
@@ -134,15 +96,14 @@ void SupernodalCholesky::find_sources() {
 }
 
 void SupernodalCholesky::divide_work() {
-  // Work of a supernode where it is a source or itself, summed over its subtree; parents follow children.
+  // Work of a supernode where it is a source or itself, summed over its subtree.
   std::vector<double> work(supernodes_.count(), 0.0);
-  std::vector<int> parent(supernodes_.count(), -1);
+  const std::vector<int> parent = supernodes_.parents();
   for (const Panel& panel : panels_)
     for (int k = panel.source_begin; k < panel.source_end; ++k) {
       const Source& source = sources_[k];
       work[panel.super] += 2. * width(source.super) * (source.row_end - source.row_begin) *
                            (height(source.super) - source.row_begin);
-      if (parent[source.super] < 0 || panel.super < parent[source.super]) parent[source.super] = panel.super;
     }
   double total = 0;
   for (int s = 0; s < supernodes_.count(); ++s) {

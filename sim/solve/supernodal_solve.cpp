@@ -7,49 +7,11 @@
 #include <vector>
 
 #include "sim/core/error.h"
-
-extern "C" {
-void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
-            const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
-            const double* beta, double* c, const int* ldc);
-void sgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
-            const float* alpha, const float* a, const int* lda, const float* b, const int* ldb,
-            const float* beta, float* c, const int* ldc);
-void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
-            const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
-void strsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m,
-            const int* n, const float* alpha, const float* a, const int* lda, float* b, const int* ldb);
-void dtrsv_(const char* uplo, const char* trans, const char* diag, const int* n, const double* a,
-            const int* lda, double* x, const int* incx);
-void strsv_(const char* uplo, const char* trans, const char* diag, const int* n, const float* a,
-            const int* lda, float* x, const int* incx);
-void dgemv_(const char* trans, const int* m, const int* n, const double* alpha, const double* a,
-            const int* lda, const double* x, const int* incx, const double* beta, double* y, const int* incy);
-void sgemv_(const char* trans, const int* m, const int* n, const float* alpha, const float* a, const int* lda,
-            const float* x, const int* incx, const float* beta, float* y, const int* incy);
-}
+#include "sim/solve/blas.h"
 
 namespace rhytid {
 
 namespace {
-
-/// The BLAS of a scalar type.
-template <class Real>
-struct Blas;
-template <>
-struct Blas<double> {
-  static constexpr auto gemm = dgemm_;
-  static constexpr auto gemv = dgemv_;
-  static constexpr auto trsm = dtrsm_;
-  static constexpr auto trsv = dtrsv_;
-};
-template <>
-struct Blas<float> {
-  static constexpr auto gemm = sgemm_;
-  static constexpr auto gemv = sgemv_;
-  static constexpr auto trsm = strsm_;
-  static constexpr auto trsv = strsv_;
-};
 
 // A piece holds at most this share of the factor's entries: several for every thread, and little left above them.
 constexpr double kPieceShare = 1. / 24;
@@ -144,16 +106,14 @@ SupernodalSolve::SupernodalSolve(const Supernodes& supernodes) : supernodes_(sup
 
 void SupernodalSolve::find_pieces() {
   const int n = supernodes_.count();
-  std::vector<int> super_of(static_cast<std::size_t>(supernodes_.size()));
-  for (int s = 0; s < n; ++s) std::fill_n(super_of.begin() + supernodes_.first(s), supernodes_.width(s), s);
-  std::vector<int> parent(n, -1), first(n), members(n, 1);
+  const std::vector<int> parent = supernodes_.parents();
+  std::vector<int> first(n), members(n, 1);
   std::vector<double> entries(n);
   double& total = entries_;
   for (int s = 0; s < n; ++s) {
     first[s] = s;
     entries[s] = static_cast<double>(supernodes_.width(s)) * supernodes_.height(s);
     total += entries[s];
-    if (left(s) > 0) parent[s] = super_of[supernodes_.rows(s)[supernodes_.width(s)]];
     largest_height_ = std::max(largest_height_, supernodes_.height(s));
   }
   for (int s = 0; s < n; ++s) {

@@ -7,7 +7,9 @@
 
 #include <cholmod.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <vector>
 
 namespace rhytid {
 
@@ -28,6 +30,21 @@ class Supernodes {
   int height(int s) const { return row_start_[s + 1] - row_start_[s]; }
   /// [height] ascending; the first `width` are the supernode's columns.
   const int* rows(int s) const { return rows_ + row_start_[s]; }
+  /// [size()] the supernode of every column.
+  std::vector<int> of_columns() const {
+    std::vector<int> super_of(static_cast<std::size_t>(size()));
+    for (int s = 0; s < count(); ++s) std::fill_n(super_of.begin() + first(s), width(s), s);
+    return super_of;
+  }
+  /// [count()] the parent of every supernode in the elimination tree, that of the first row below its columns; -1
+  /// for roots. Parents follow children.
+  std::vector<int> parents() const {
+    const std::vector<int> super_of = of_columns();
+    std::vector<int> parent(static_cast<std::size_t>(count()), -1);
+    for (int s = 0; s < count(); ++s)
+      if (height(s) > width(s)) parent[s] = super_of[rows(s)[width(s)]];
+    return parent;
+  }
   /// Values, or room for them; floats lie in the first half of the storage of doubles.
   template <class Real>
   Real* block(int s) const {

@@ -143,11 +143,12 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
 
   report.steps = static_cast<int>(run.steps.size());
   report.run_seconds = run.seconds;
-  double factorisations = 0, single = 0;
+  double factorisations = 0, single = 0, kept = 0;  // kept: iterations that a factor of before steers
   for (const StepRecord& record : run.steps) {
     report.iterations += record.report.iterations;
     factorisations += record.report.factorisations;
     single += record.report.single_factorisations;
+    kept += record.report.lbfgs_iterations;
   }
   const auto per_step = [&](double count) { return count / report.steps; };
   const double prepares = per_step(static_cast<double>(after.prepare - before.prepare)),
@@ -226,13 +227,10 @@ std::optional<StageReport> measure_stages(const SceneModel& scene_model, double 
       [&] { positive = factor.factorize(matrix, 0, Precision::single) && positive; });
   // On stiff matrices single precision may fail; a run then corrects no direction by it either.
   if (!stopped && factor.usable()) {
-    // Where factors are in single precision every one gives a direction at most (some are certificates, or refused), and
-    // serves the iterations that have none.
-    add({.name = "solve, single",
-         .calls = single > 0 ? std::max(0., iterations - per_step(single)) : 0,
-         .bytes = factor_bytes / 2},
+    // Iterations by a kept factor take one solve, those with a factor of their own a direction that is corrected.
+    add({.name = "solve, single", .calls = single > 0 ? per_step(kept) : 0, .bytes = factor_bytes / 2},
         [&] { solution = factor.solve(rhs.col(0)); });
-    add({.name = "direction, corrected", .calls = per_step(single)},
+    add({.name = "direction, corrected", .calls = single > 0 ? iterations - per_step(kept) : 0},
         [&] { (void)factor.solve_iteratively(matrix, rhs.col(0), kDirectionTolerance, kMaxCorrections); });
   }
   add({.name = "matrix times vector",
