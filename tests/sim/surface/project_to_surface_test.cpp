@@ -41,7 +41,7 @@ TEST(ProjectToSurface, FindsTheClosestOfManyTriangles) {
     const Vec3 x = random_vector(random, 15);
     const SurfacePoint p = project_to_surface(mesh.nodes, mesh.triangles, x);
     for (const auto& triangle : mesh.triangles)
-      EXPECT_GE(project_to_surface(mesh.nodes, {triangle}, x).distance, p.distance);
+      EXPECT_GE(project_to_surface(mesh.nodes, {triangle}, x).distance, (1 - 1e-14) * p.distance);
   }
 }
 
@@ -55,6 +55,20 @@ TEST(ProjectToSurface, KeepsPointsThatLieOnTheSurface) {
   }
   EXPECT_LT((project_to_surface(mesh.nodes, mesh.triangles, Vec3(-3, 5, 1)).point - Vec3(0, 4, 0)).norm(),
             1e-15);
+}
+
+// Beside an edge, above the face: distances to both faces are the same number, and only one is right.
+TEST(ProjectToSurface, FollowsSmallMovesAcrossEdgesAndCorners) {
+  const testing::Mesh mesh = testing::square(8, 4);
+  for (const Vec3& on : {Vec3(2, 1, 0), Vec3(2, 0.3, 0), Vec3(1.7, 2, 0), Vec3(0.6, 0.6, 0)})
+    for (const double lift : {0.0, 1.65, -1.65})
+      for (double step = 1e-12; step < 1e-5; step *= 10)
+        for (int k = 0; k < 8; ++k) {
+          const double angle = (k + 0.3) * EIGEN_PI / 4;
+          const Vec3 x = on + step * Vec3(std::cos(angle), std::sin(angle), 0);
+          const Vec3 p = project_to_surface(mesh.nodes, mesh.triangles, x + lift * Vec3::UnitZ()).point;
+          EXPECT_LT((p - x).norm(), 2e-15) << on.transpose() << ", " << lift << ", " << step << ", " << k;
+        }
 }
 
 TEST(ProjectToSurface, RefusesAnEmptyOrBrokenMesh) {
