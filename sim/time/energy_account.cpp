@@ -6,7 +6,6 @@ EnergyAccount account_step(const StepProblem& problem, const State& end) {
   const Model& model = problem.model();
   const State& old = problem.old();
   EnergyAccount account;
-  double force_work = 0;
   for (std::size_t k = 0; k < model.terms.size(); ++k) {
     const Term& term = model.terms[k];
     const std::size_t at = model.history_offset(k);
@@ -22,7 +21,6 @@ EnergyAccount account_step(const StepProblem& problem, const State& end) {
     one.work = e.body_work;
     one.dissipated = e.dissipated;
     one.numerical = e.force_work - one.stored_change - one.dissipated + one.work;
-    force_work += e.force_work;
     account.stored_change += one.stored_change;
     account.work += one.work;
     account.dissipated += one.dissipated;
