@@ -368,15 +368,24 @@ std::string interval_note(const JointProblem& problem, const NoiseCheck& noise,
 
 namespace {
 
-/// " hangs on ...": what of a parameter that is held, a number that is, or a path makes most of a deviation.
-std::string hangs_on(const SystematicShift& shift) {
+/// "a", "a and b", "a, b and c".
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    text += (k == 0 ? "" : k + 1 < names.size() ? ", " : " and ") + names[k];
+  return text;
+}
+
+/// What of a parameter that is held, a number that is, or a path makes most of the deviations of `names`.
+std::string hangs_on(const std::vector<std::string>& names, const SystematicShift& shift) {
   const std::string what = shift.name.substr(std::string("held ").size());
+  const std::string start = listed(names) + (names.size() > 1 ? " hang on " : " hangs on ");
   if (!shift.axes.empty())
-    return " hangs on how well the " + what + " is known: the table says what it moves. Measure it better" +
+    return start + "how well the " + what + " is known: the table says what it moves. Measure it better" +
            (what.ends_with(" offset") ? ", or fit it (/fit/path_deviations fit)." : ".");
   if (shift.rms_px > 0)
-    return " hangs on the " + what + ", which is held: the table says what it moves. Measure it.";
-  return " hangs on a parameter that is held, " + what +
+    return start + "the " + what + ", which is held: the table says what it moves. Measure it.";
+  return start + "a parameter that is held, " + what +
          ": the table says what it moves. Fit it too, or measure it.";
 }
 
@@ -394,25 +403,39 @@ void add_systematic_notes(const FitCase& options, FitResult& result) {
       "that are held but not known exactly off by their deviation, and differentiated by parameters that are "
       "held and by where paths are; by what that would move a parameter, to first order, its interval is "
       "wider, 1.96 times each, in squares.");
+  // One sentence for all parameters that the same thing moves.
+  const auto is_most = [&](double variance, std::size_t k) {
+    return variance > 0.5 * result.parameters[k].sigma * result.parameters[k].sigma;
+  };
+  for (const SystematicShift& shift : result.systematic) {
+    if (!shift.failure.empty() || !shift.is_held()) continue;
+    std::vector<std::string> names;
+    for (std::size_t k = 0; k < result.parameters.size(); ++k)
+      if (is_most(shift.shift[k] * shift.shift[k], k)) names.push_back(result.parameters[k].name);
+    if (!names.empty()) result.cannot_tell.push_back(hangs_on(names, shift));
+  }
+  std::vector<std::pair<std::string, std::vector<std::string>>>
+      limited;  // by the change that moves them most
   for (std::size_t k = 0; k < result.parameters.size(); ++k) {
-    const FittedParameter& p = result.parameters[k];
     const SystematicShift* largest = nullptr;
     double finer = 0;
     for (const SystematicShift& shift : result.systematic) {
-      if (!shift.failure.empty()) continue;
-      if (shift.is_held()) {
-        if (shift.shift[k] * shift.shift[k] > 0.5 * p.sigma * p.sigma)
-          result.cannot_tell.push_back(p.name + hangs_on(shift));
-        continue;
-      }
+      if (!shift.failure.empty() || shift.is_held()) continue;
       finer += shift.shift[k] * shift.shift[k];
       if (largest == nullptr || std::fabs(shift.shift[k]) > std::fabs(largest->shift[k])) largest = &shift;
     }
-    if (largest != nullptr && finer > 0.5 * p.sigma * p.sigma)
-      result.cannot_tell.push_back("The discretisation, not the footage, limits " + p.name +
-                                   ", most of all this: " + largest->change +
-                                   " would move it as the table says.");
+    if (largest == nullptr || !is_most(finer, k)) continue;
+    const auto found = std::find_if(limited.begin(), limited.end(),
+                                    [&](const auto& entry) { return entry.first == largest->change; });
+    if (found == limited.end())
+      limited.push_back({largest->change, {result.parameters[k].name}});
+    else
+      found->second.push_back(result.parameters[k].name);
   }
+  for (const auto& [change, names] : limited)
+    result.cannot_tell.push_back("The discretisation, not the footage, limits " + listed(names) +
+                                 ", most of all this: " + change + " would move " +
+                                 (names.size() > 1 ? "them" : "it") + " as the table says.");
 }
 
 }  // namespace rhytid::fitting

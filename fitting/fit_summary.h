@@ -51,7 +51,7 @@ void add_notes(const JointFitInput& input, JointProblem& problem, const VectorXd
 /// How the intervals came about.
 std::string interval_note(const JointProblem& problem, const NoiseCheck& noise, const Identifiability& found);
 /// Where a shift of `result.systematic` makes more of a parameter's variance than all else, a sentence in
-/// `cannot_tell`; and notes on what they are.
+/// `cannot_tell`, one for all parameters that the same thing moves; and notes on what they are.
 void add_systematic_notes(const FitCase& options, FitResult& result);
 
 }  // namespace rhytid::fitting

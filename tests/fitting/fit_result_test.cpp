@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "fitting/fit_summary.h"
 #include "fitting/measured_unit.h"
 #include "fitting/median.h"
 #include "sim/core/error.h"
@@ -227,6 +228,47 @@ TEST(FitResult, DamagedFilesAreRefusedByName) {
   EXPECT_THAT(message_after("/residuals.csv", "weight", "weigh"), HasSubstr("residuals.csv:1"));
   EXPECT_THAT(message_after("/residuals.csv", "4,7,1", "4,7,one"), HasSubstr("residuals.csv:3"));
   EXPECT_THROW(read_fit_result(fresh_folder("missing")), InputError);
+}
+
+TEST(FitResult, OneSentenceForAllParametersThatTheSameThingMoves) {
+  FitResult r;
+  for (const char* name : {"left strength", "right strength", "film modulus", "friction"}) {
+    FittedParameter p;
+    p.name = name;
+    p.sigma = 1;
+    r.parameters.push_back(p);
+  }
+  const auto shift = [](const char* name, const char* change, std::vector<double> by) {
+    SystematicShift s;
+    s.name = name;
+    s.change = change;
+    s.shift = std::move(by);
+    return s;
+  };
+  r.systematic = {shift("plane", "finer elements", {0.1, 0.8, 0.1, 0.1}),
+                  shift("steps", "shorter steps", {0.1, 0.1, 0.1, 0.8}),
+                  shift("thickness", "more elements", {0, 0.1, 0.1, 0}),
+                  shift("held finger path offset", "", {0.8, 0.2, 0.9, 0.1}),
+                  shift("held soft modulus", "", {0.2, 0.1, 0.1, 0.1})};
+  r.systematic[3].axes = {r.systematic[3].shift};
+  add_systematic_notes(FitCase{}, r);
+  EXPECT_EQ(
+      r.cannot_tell,
+      (std::vector<std::string>{
+          "left strength and film modulus hang on how well the finger path offset is known: the table says "
+          "what it moves. Measure it better, or fit it (/fit/path_deviations fit).",
+          "The discretisation, not the footage, limits right strength, most of all this: finer elements "
+          "would move it as the table says.",
+          "The discretisation, not the footage, limits friction, most of all this: shorter steps would "
+          "move it as the table says."}));
+  r.cannot_tell.clear();
+  r.systematic[0].shift[3] = 0.9;
+  r.systematic[3].failure = "it did not converge";
+  add_systematic_notes(FitCase{}, r);
+  EXPECT_EQ(r.cannot_tell,
+            (std::vector<std::string>{
+                "The discretisation, not the footage, limits right strength and friction, most of "
+                "all this: finer elements would move them as the table says."}));
 }
 
 }  // namespace
