@@ -46,9 +46,7 @@ struct FitParameter {
   std::vector<std::pair<std::string, double>> moves = {};
   std::string name = {};   ///< for reports; of the scene's own parameters the scene says it
   std::string group = {};  ///< parameters of one name here are considered as one, by the sum of what they do
-  /// Considered by what the residuals leave of its deviation, which nobody stated (residual_signature.h).
-  bool is_guessed = false;
-  bool is_held = false;  ///< only differentiated by (consider.h): observations need not outnumber these
+  bool is_held = false;    ///< only differentiated by (consider.h): observations need not outnumber these
 };
 
 /// A number of the scene that is none of its parameters, and to what it is known (considered_quantities.h); or the

@@ -207,11 +207,12 @@ std::vector<Rule> fit_rules() {
        .doc = "Forward runs at most."},
       {.pointer = "/fit/consider",
        .type = RuleType::array,
-       .doc =
-           "What is held though it is not known exactly: what its error would move enters the intervals. "
-           "Default: friction coefficients that are not fitted, factor 1.35; the thickness of every layer, "
-           "10 %; paths of colliders that state no deviations, what the residuals leave of 0.25 mm in each "
-           "direction for all knots alike. A list takes the place of all these; []: all is exact."},
+       .doc = "What is held though it is not known exactly: what the residuals leave of its error widens the "
+              "intervals by what that would move; stated and default deviations alike, so that a smaller one "
+              "never widens more by itself. Default: friction coefficients that are not fitted, factor 1.35; "
+              "the "
+              "thickness of every layer, 10 %; paths of colliders that state no deviations, 0.25 mm in each "
+              "direction for all knots alike. A list takes the place of all these; []: all is exact."},
       {.pointer = "/fit/consider/*", .type = RuleType::object, .doc = "One of them."},
       {.pointer = "/fit/consider/*/address",
        .type = RuleType::string,

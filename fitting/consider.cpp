@@ -1,15 +1,13 @@
 #include "fitting/consider.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <set>
 
+#include "fitting/error_posterior.h"
 #include "fitting/fit_logs.h"
-#include "fitting/fit_summary.h"
 #include "fitting/path_deviations.h"
 #include "fitting/residual_signature.h"
 #include "sim/core/error.h"
@@ -71,16 +69,7 @@ void sum_up(SystematicShift& found) {
     const Eigen::Map<const VectorXd> shift(axis.data(), n);
     sum += shift * shift.transpose();
   }
-  const VectorXd size = sum.diagonal().cwiseSqrt();
-  found.shift.assign(size.begin(), size.end());
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(sum);
-  found.axes.clear();
-  for (Eigen::Index a = n - 1; a >= 0; --a) {
-    if (!(eigen.eigenvalues()[a] > 0)) continue;
-    const VectorXd axis = std::sqrt(eigen.eigenvalues()[a]) * eigen.eigenvectors().col(a);
-    found.axes.emplace_back(axis.begin(), axis.end());
-  }
-  if (found.axes.empty()) found.axes.push_back(found.shift);  // nothing moves
+  set_covariance(sum, found);
 }
 
 }  // namespace
@@ -149,26 +138,6 @@ std::vector<SystematicShift> refused(const std::vector<FitParameter>& held, cons
     shift.failure = why;
   }
   return shifts;
-}
-
-/// What the shift's axes come to where nobody stated a deviation: not by that of the default, but by what the residuals
-/// leave of it. Their variance is that of what is left when they are explained by these columns.
-void weigh_by_residuals(JointProblem& problem, const VectorXd& t, const FitProblem::Linearised& linearised,
-                        const MatrixXd& basis, const MatrixXd& columns, SystematicShift& shift) {
-  const NoiseCheck noise = check_noise(problem, t, linearised.residuals);
-  const double left = std::max(0.0, linearised.residuals.squaredNorm() - shift.explained) /
-                      std::max(1, problem.degrees_of_freedom());
-  const double widening = interval_widening(left, noise.autocorrelation);
-  const Eigen::LLT<MatrixXd> squares(expected_squares(linearised, basis, columns, widening * widening));
-  if (squares.info() != Eigen::Success) return;
-  const auto count = static_cast<Eigen::Index>(shift.axes.size());
-  MatrixXd axes(static_cast<Eigen::Index>(shift.axes.front().size()), count);
-  for (Eigen::Index a = 0; a < count; ++a)
-    axes.col(a) = Eigen::Map<const VectorXd>(shift.axes[static_cast<std::size_t>(a)].data(), axes.rows());
-  axes = axes * MatrixXd(squares.matrixL());
-  for (Eigen::Index a = 0; a < count; ++a)
-    shift.axes[static_cast<std::size_t>(a)].assign(axes.col(a).begin(), axes.col(a).end());
-  shift.change += " by default, weighed by what the residuals leave of them";
 }
 
 /// The input with these parameters behind its own, at the values that they have at t.
@@ -250,17 +219,13 @@ Considered consider(const JointFitInput& input, const std::vector<FitParameter>&
         found.axes.emplace_back(shift.begin(), shift.end());
     }
     for (std::size_t g = 0; g < shifts.size(); ++g) {
-      if (!shifts[g].failure.empty() || axes[g].size() > kMostAxes) {
-        sum_up(shifts[g]);
-        continue;
-      }
+      if (!shifts[g].failure.empty()) continue;
       MatrixXd moved(at->jacobian.rows(), static_cast<Eigen::Index>(axes[g].size()));
       for (std::size_t k = 0; k < axes[g].size(); ++k)
         moved.col(static_cast<Eigen::Index>(k)) =
             *held[static_cast<std::size_t>(columns[g][k] - n)].prior_sigma * at->jacobian.col(columns[g][k]);
-      add_signature(linearised, basis, moved, axes[g], shifts[g]);
-      if (held[static_cast<std::size_t>(columns[g].front() - n)].is_guessed)
-        weigh_by_residuals(problem, t, linearised, basis, moved, shifts[g]);
+      if (axes[g].size() <= kMostAxes) add_signature(linearised, basis, moved, axes[g], shifts[g]);
+      shifts[g].columns = std::move(moved);
       sum_up(shifts[g]);
     }
   } catch (const InputError& error) {

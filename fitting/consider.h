@@ -3,8 +3,8 @@
 //
 //   δ_h = −P Pᵀ Jᵀ J_h σ_h
 //
-// is by how much the answer moves, to first order, when h is off by σ_h. Residuals do not show it: a wrong
-// friction is fitted away by moduli. Each δ_h enters the covariance as δ_h δ_hᵀ (identifiability.h).
+// is by how much the answer moves, to first order, when h is off by σ_h. Residuals hardly show it: a wrong
+// friction is fitted away by moduli. By what they show of it δ_h counts in the covariance (error_posterior.h).
 // Numbers of the scene that no derivative is known of: considered_quantities.h.
 //
 // Source  Schmidt 1966; Tapley, Schutz and Born 2004, "consider covariance analysis".
@@ -25,8 +25,8 @@ inline constexpr double kFrictionSigma = 0.3;
 /// in prior_sigma; behind what paths of colliders are off by (`path_errors`). Those with σ_h = 0 are exact.
 std::vector<FitParameter> considered_parameters(const JointFitInput& input);
 
-/// One run of every clip with one more sweep, at `t`, where the problem was last evaluated with the
-/// linearisation there. Nothing when there is nothing to consider or the observer stops it; runs are kept in,
+/// Shifts in full, with their columns. One run of every clip with one more sweep, at `t`, where the problem was last
+/// evaluated with the linearisation there. Nothing when there is nothing to consider or the observer stops it; runs are kept in,
 /// and taken from, the log of evaluations. A parameter that the scene holds outside its usual bounds, and all when
 /// the sweep fails, say so in `failure`.
 std::vector<SystematicShift> considered_shifts(const JointFitInput& input, JointProblem& problem,

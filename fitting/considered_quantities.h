@@ -5,7 +5,8 @@
 //
 //   δ = −(JᵀJ)⁺ Jᵀ W (predicted(q) − predicted(q + σ))
 //
-// The step is σ itself, upwards, so what is not linear in it is in the shift as it is on that side.
+// The step is σ itself, upwards, so what is not linear in it is in the shift as it is on that side. Of this the answer's
+// covariance has what the residuals leave (error_posterior.h).
 //
 // By default the thickness of every layer is considered. In vivo it is known badly: in 200 adults of one sex and of ten years
 // of age, 50 MHz ultrasound finds cheeks of 1.90 ± 0.21 mm, canthi of 1.36 ± 0.11 and eyelids of 1.24 ± 0.25 ("Research value

@@ -78,6 +78,7 @@ std::vector<SystematicShift> difference_shifts(const std::vector<OtherFit>& othe
       found.shift.assign(shift.begin(), shift.end());
       found.rms_px = std::sqrt(change.squares / std::max(1, change.count));
       add_signature(linearised, basis, change.whitened, {fit.axis}, found);
+      found.columns = change.whitened;
     } catch (const InputError& error) {
       found.failure = error.what();
     }

@@ -7,6 +7,7 @@
 #include "fitting/consider.h"
 #include "fitting/considered_quantities.h"
 #include "fitting/discretisation.h"
+#include "fitting/error_posterior.h"
 #include "fitting/fit_logs.h"
 #include "fitting/fit_summary.h"
 #include "fitting/further_views.h"
@@ -108,10 +109,11 @@ void describe_best(const JointFitInput& input, JointProblem& problem, WaveLead* 
     result.systematic.insert(result.systematic.end(), moved.begin(), moved.end());
   }
   add_path_notes(input, result);
-  for (const SystematicShift& shift : result.systematic) {
-    if (!shift.failure.empty()) continue;
-    if (shift.axes.empty()) found.add_systematic(shift.shift);
-    for (const std::vector<double>& axis : shift.axes) found.add_systematic(axis);
+  weigh_by_residuals(*linearised, found.basis(), problem.degrees_of_freedom(), noise.autocorrelation,
+                     result.systematic);
+  for (const SystematicShift* shift : counted_shifts(result.systematic)) {
+    if (shift->axes.empty()) found.add_systematic(shift->shift);
+    for (const std::vector<double>& axis : shift->axes) found.add_systematic(axis);
   }
   add_parameters(problem, t, &found, truth, result);
   if (lead != nullptr) lead->add_note(t, found, result);

@@ -84,6 +84,7 @@ void fields(Archive& field, Record& d) {
   field("seconds", d.seconds);
   field("shift", d.shift);
   field.optional("axes", d.axes);
+  field.optional("left", d.left);
   field.optional("signature", d.signature);
   if (!d.signature.empty()) field("explained", d.explained);
 }
@@ -396,6 +397,14 @@ void check_sizes(const FitResult& result, const std::string& where) {
 }
 
 }  // namespace
+
+std::vector<const SystematicShift*> counted_shifts(const std::vector<SystematicShift>& shifts) {
+  if (!shifts.empty() && shifts.back().name == kTogether) return {&shifts.back()};
+  std::vector<const SystematicShift*> counted;
+  for (const SystematicShift& shift : shifts)
+    if (shift.failure.empty()) counted.push_back(&shift);
+  return counted;
+}
 
 std::vector<DerivedProfile> derived_profiles(const FitResult& result, const ParameterProfile& profile) {
   std::vector<DerivedProfile> found;

@@ -43,7 +43,7 @@ struct ResidualAxis {
 };
 
 /// By how much the answer would move with one kind of step of the discretisation finer (discretisation.h), or
-/// with something that is held off by its deviation (consider.h, considered_quantities.h).
+/// with something that is held off by what is left of its deviation (consider.h, considered_quantities.h).
 struct SystematicShift {
   std::string name;           ///< thickness | plane | steps | held NAME
   std::string change;         ///< what was changed, in words
@@ -55,8 +55,19 @@ struct SystematicShift {
   std::vector<std::vector<double>> axes = {};
   std::vector<ResidualAxis> signature = {};  ///< what the residuals say of it; empty where not looked at
   double explained = 0;                      ///< of |z|² of the whitened residuals, by the whole signature
+  /// Of something held, by error: root mean square, in deviations, that the residuals leave of it (error_posterior.h); `shift`
+  /// has this factor. Empty where they were not asked.
+  std::vector<double> left = {};
+  /// [residuals][errors] by which the whitened residuals change with each error by a deviation; only while fitting.
+  MatrixXd columns = {};
   bool is_held() const { return name.starts_with("held"); }
 };
+
+/// Name of the shift that has all others together, where the residuals were asked about them.
+inline constexpr const char* kTogether = "together";
+
+/// The shifts whose squares intervals have: the one of all together where there is one, else each that could be run.
+std::vector<const SystematicShift*> counted_shifts(const std::vector<SystematicShift>& shifts);
 
 /// A view that was not filmed, and what it would do to the deviations (further_views.h).
 struct FurtherView {

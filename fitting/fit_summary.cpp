@@ -402,16 +402,25 @@ void add_systematic_notes(const FitCase& options, FitResult& result) {
       "scene "
       "that are held but not known exactly off by their deviation, and differentiated by parameters that are "
       "held and by where paths are; by what that would move a parameter, to first order, its interval is "
-      "wider, 1.96 times each, in squares.");
+      "wider, 1.96 times" +
+      std::string(result.systematic.back().name == kTogether
+                      ? " all together, of what is held by what the residuals leave of it."
+                      : " each, in squares."));
   // One sentence for all parameters that the same thing moves.
   const auto is_most = [&](double variance, std::size_t k) {
     return variance > 0.5 * result.parameters[k].sigma * result.parameters[k].sigma;
+  };
+  // What moves one by more than all together is made up for by the others: residuals know their sum.
+  const SystematicShift& last = result.systematic.back();
+  const auto is_made_up_for = [&](double shift, std::size_t k) {
+    return last.name == kTogether && std::fabs(shift) > (1 + 1e-9) * last.shift[k];
   };
   for (const SystematicShift& shift : result.systematic) {
     if (!shift.failure.empty() || !shift.is_held()) continue;
     std::vector<std::string> names;
     for (std::size_t k = 0; k < result.parameters.size(); ++k)
-      if (is_most(shift.shift[k] * shift.shift[k], k)) names.push_back(result.parameters[k].name);
+      if (is_most(shift.shift[k] * shift.shift[k], k) && !is_made_up_for(shift.shift[k], k))
+        names.push_back(result.parameters[k].name);
     if (!names.empty()) result.cannot_tell.push_back(hangs_on(names, shift));
   }
   std::vector<std::pair<std::string, std::vector<std::string>>>
@@ -420,7 +429,7 @@ void add_systematic_notes(const FitCase& options, FitResult& result) {
     const SystematicShift* largest = nullptr;
     double finer = 0;
     for (const SystematicShift& shift : result.systematic) {
-      if (!shift.failure.empty() || shift.is_held()) continue;
+      if (!shift.failure.empty() || shift.is_held() || shift.name == kTogether) continue;
       finer += shift.shift[k] * shift.shift[k];
       if (largest == nullptr || std::fabs(shift.shift[k]) > std::fabs(largest->shift[k])) largest = &shift;
     }

@@ -193,7 +193,6 @@ namespace {
 struct KnownPath {
   PathDeviations deviations;
   std::string source;
-  bool is_guessed = false;  ///< by default
 };
 
 /// Whether the fit has knots of the path among its parameters, in that direction.
@@ -235,7 +234,7 @@ std::optional<KnownPath> known_path(const JointFitInput& input, const std::strin
       return KnownPath{*stated, ""};
     }
   if (input.options.consider) return std::nullopt;
-  KnownPath known{alike(kPathSigma), "by default, since nothing states its deviations", true};
+  KnownPath known{alike(kPathSigma), "by default, since nothing states its deviations"};
   for (int a = 0; a < 3; ++a)
     if (fits_knots(input, clip, collider, a)) known.deviations.shared(a, a) = 0;
   if (known.deviations.shared.isZero(0)) return std::nullopt;
@@ -283,13 +282,11 @@ JointFitInput with_path_errors(const JointFitInput& input) {
         continue;
       }
       PathModes modes(collider, of_clip, knots_seen(collider, clip.scene.time, last), known->deviations);
-      for (FitParameter& p : modes.shared) p.is_guessed = known->is_guessed;
       const bool fits_here = use == "fit" && !modes.shared.empty();
       out.path_notes.push_back(which + size +
                                (fits_here ? "the offset is fitted with that as its prior, what knots err by "
                                             "themselves is considered."
-                                : known->is_guessed ? "what the residuals leave of that is considered."
-                                                    : "what that would move is considered."));
+                                          : "what the residuals leave of that is considered."));
       auto& of_shared = fits_here ? fitted : out.path_errors;
       of_shared.insert(of_shared.end(), modes.shared.begin(), modes.shared.end());
       out.path_errors.insert(out.path_errors.end(), modes.own.begin(), modes.own.end());

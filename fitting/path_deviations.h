@@ -16,10 +16,9 @@
 // Where a path states none, /fit/consider may say of "/colliders/NAME/path" how well it is known in each direction,
 // all knots alike; where the case has no /fit/consider either, that is kPathSigma. An outline of a ball that is read to a
 // pixel or two of 0.05 to 0.1 mm, and a pose of the camera that is off by as much, leave a quarter of a millimetre;
-// so does the pad of a finger, which is no rigid ball. As a guess it does not count in full: with s_a ~ N(0, 1) before, what
-// the residuals leave of it, E[s sᵀ | z] (residual_signature.h), takes the place of the identity. A finger that is
-// off by more than the guess then widens by what the residuals say, and one that is where it should be by little. Deviations that
-// are stated count as stated. Directions in which the case fits knots are theirs.
+// so does the pad of a finger, which is no rigid ball. Guessed or stated, what counts is what the residuals leave of it, by
+// s_a ~ N(0, 1) before (error_posterior.h): a finger that is off by more than was said widens by what the residuals say, and
+// one that is where it should be by little. Directions in which the case fits knots are theirs.
 //
 // Tests: tests/fitting/path_deviations_test.cpp
 #pragma once

@@ -36,24 +36,13 @@ std::string in_words(const ResidualAxis& axis, double widening) {
          number("%.0f", std::fabs(estimate) / sigma) + " σ)";
 }
 
-/// A: the part of the columns that the fitted parameters cannot make.
+}  // namespace
+
 MatrixXd own_part(const FitProblem::Linearised& at, const MatrixXd& basis, const MatrixXd& columns) {
   const MatrixXd fitted = at.jacobian * basis;  // orthonormal
   MatrixXd own = columns - fitted * (fitted.transpose() * columns);
   own -= fitted * (fitted.transpose() * own);  // what rounding left of it
   return own;
-}
-
-}  // namespace
-
-MatrixXd expected_squares(const FitProblem::Linearised& at, const MatrixXd& basis, const MatrixXd& columns,
-                          double variance) {
-  const MatrixXd own = own_part(at, basis, columns);
-  const MatrixXd one = MatrixXd::Identity(columns.cols(), columns.cols());
-  const Eigen::LLT<MatrixXd> information(own.transpose() * own / variance + one);
-  if (information.info() != Eigen::Success) return one;
-  const VectorXd estimate = -information.solve(own.transpose() * at.residuals) / variance;
-  return information.solve(one) + estimate * estimate.transpose();
 }
 
 void add_signature(const FitProblem::Linearised& at, const MatrixXd& basis, const MatrixXd& columns,

@@ -6,7 +6,8 @@
 //
 // and |z|² falls by zᵀA (AᵀA)⁻¹ Aᵀz. To first order s is what a fit of those things together with the parameters
 // would find: by how much of its change each is off. It says what the residuals look like, not what is wrong:
-// other errors of the model may look alike.
+// other errors of the model may look alike. What it leaves of errors whose size is known before:
+// error_posterior.h.
 //
 // Tests: tests/fitting/residual_signature_test.cpp
 #pragma once
@@ -24,10 +25,8 @@ namespace rhytid::fitting {
 void add_signature(const FitProblem::Linearised& at, const MatrixXd& basis, const MatrixXd& columns,
                    const std::vector<ResidualAxis>& axes, SystematicShift& shift);
 
-/// E[s sᵀ | z] of the columns' amounts s [axes][axes] that are 0 ± 1 each before the residuals are looked at, which have
-/// `variance`: (AᵀA/w² + 1)⁻¹ + ŝ ŝᵀ. The identity where the fitted parameters make all that a column does.
-MatrixXd expected_squares(const FitProblem::Linearised& at, const MatrixXd& basis, const MatrixXd& columns,
-                          double variance);
+/// A: the part of the columns that the fitted parameters cannot make.
+MatrixXd own_part(const FitProblem::Linearised& at, const MatrixXd& basis, const MatrixXd& columns);
 
 /// Sentences on a reduced chi-square of the result that is well above what noise makes: which of the changes that were looked
 /// at (`result.systematic`) the residuals look like, the one that explains most first, with those of its axes that are

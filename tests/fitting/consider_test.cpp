@@ -5,36 +5,22 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstdio>
 
-#include "tests/fitting/synthetic_tracks.h"
+#include "tests/fitting/small_drag.h"
 
 namespace rhytid::fitting {
 namespace {
 
 using testing::HasSubstr;
 
-constexpr int kFrames = 4;
 const char* const kFriction = "/colliders/finger/friction/coefficient";
 
-/// Film and a source's strength, the finger's friction held at `friction` where the tracks have 0.4.
+/// The finger's friction held at `friction` where the tracks have 0.4.
 FitInput make_input(double friction) {
-  const Camera camera = test::make_camera();
-  FitCase fit = test::three_parameters();
-  fit.parameters.pop_back();
-  fit.consider.reset();
-  return {test::drag_scene(kFrames, {std::string(kFriction) + "=" + std::to_string(friction)}),
-          camera,
-          test::make_tracks(test::drag_scene(kFrames), camera, 4, 0.02, 3),
-          fit,
-          {}};
-}
-
-VectorXd transformed(const FitResult& result) {
-  VectorXd t(result.parameters.size());
-  for (Eigen::Index k = 0; k < t.size(); ++k) t[k] = std::log(result.parameters[k].value);
-  return t;
+  FitInput input = test::small_drag({std::string(kFriction) + "=" + std::to_string(friction)});
+  input.options.consider.reset();
+  return input;
 }
 
 TEST(Consider, FrictionThatIsNotFittedByDefault) {
@@ -65,17 +51,19 @@ TEST(Consider, ShiftIsWhatAnotherHeldValueMakesOfTheAnswer) {
   const FitResult at = run_fit(input);
   std::printf("%s", answer_text(at).c_str());
   ASSERT_TRUE(at.converged);
-  ASSERT_EQ(at.systematic.size(), 1u);
+  ASSERT_EQ(at.systematic.size(), 2u);
   ASSERT_EQ(at.systematic[0].failure, "");
   EXPECT_THAT(at.systematic[0].change, HasSubstr("off by a factor 1.05"));
-  const Eigen::Map<const VectorXd> shift(at.systematic[0].shift.data(), 2);
+  ASSERT_EQ(at.systematic[0].left.size(), 1u);
+  const VectorXd shift =
+      Eigen::Map<const VectorXd>(at.systematic[0].shift.data(), 2) / at.systematic[0].left[0];
   VectorXd moved[2];
   for (const int side : {0, 1}) {
     FitInput other = make_input(0.4 * std::exp(side == 0 ? 0.05 : -0.05));
     other.options.consider.emplace();
     const FitResult found = run_fit(other);
     ASSERT_TRUE(found.converged);
-    moved[side] = transformed(found) - transformed(at);
+    moved[side] = test::logarithms(found) - test::logarithms(at);
   }
   const VectorXd central = 0.5 * (moved[0] - moved[1]);
   std::printf("predicted %+.5f %+.5f, found %+.5f %+.5f\n", shift[0], shift[1], central[0], central[1]);
@@ -96,7 +84,7 @@ TEST(Consider, IntervalsHoldTheTruthWhereFrictionIsHeldWrong) {
   const FitResult without = run_fit(input);
   bool misses = false;
   for (std::size_t k = 0; k < 2; ++k) {
-    const double truth = get_parameter(test::drag_scene(kFrames), with.parameters[k].address);
+    const double truth = get_parameter(test::drag_scene(test::kDragFrames), with.parameters[k].address);
     EXPECT_EQ(with.parameters[k].value, without.parameters[k].value);
     EXPECT_TRUE(with.parameters[k].low95 <= truth && truth <= with.parameters[k].high95)
         << with.parameters[k].name;

@@ -50,6 +50,7 @@ FitResult example() {
                   {"steps", "finer", "no end", 0, 2, {}}};
   r.systematic[0].signature = {{"finger path x", "mm", 0.25, 1. / 3, 1e-17}};
   r.systematic[0].explained = 100. / 3;
+  r.systematic[0].left = {1. / 7};
   r.misfit = {"the model misses something"};
   r.history = {{0, 1, 10, 1, 0, 0.5, {1, 2}}, {1, 3, 1. / 7, 1e-3, 0.2, 1.5, {1.1, nan_value}}};
   r.singular_values = VectorXd::LinSpaced(2, 3.3, 0.1);
@@ -115,6 +116,7 @@ TEST(FitResult, ReadsBackBitForBit) {
   EXPECT_EQ(s.systematic[0].signature[0].estimate, 1. / 3);
   EXPECT_EQ(s.systematic[0].signature[0].sigma, 1e-17);
   EXPECT_EQ(s.systematic[0].explained, 100. / 3);
+  EXPECT_EQ(s.systematic[0].left, r.systematic[0].left);
   EXPECT_TRUE(s.systematic[1].signature.empty());
   EXPECT_EQ(s.misfit, r.misfit);
   EXPECT_EQ(s.systematic[1].failure, "no end");

@@ -14,7 +14,7 @@
 #include "sim/output/text.h"
 #include "sim/scene/collider_motion.h"
 #include "sim/scene/read_path.h"
-#include "tests/fitting/synthetic_tracks.h"
+#include "tests/fitting/small_drag.h"
 #include "tests/support/temporary_folder.h"
 
 namespace rhytid::fitting {
@@ -24,7 +24,7 @@ using testing::Contains;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-constexpr int kFrames = 4;
+constexpr int kFrames = test::kDragFrames;
 // Of all knots alike, best known across the line of sight of make_camera, and of each by itself.
 const Vec3 kSight = Vec3(5, -20, 55).normalized();
 const Mat3 kShared =
@@ -65,33 +65,15 @@ class PathDeviationsTest : public testing::Test {
 
   /// Film and a source's strength from tracks of the truth, the finger on a path that was measured.
   FitInput make_input(unsigned seed, const std::string& use) const {
-    const Camera camera = test::make_camera();
-    FitCase fit = test::three_parameters();
-    fit.parameters = {test::fitted("/ligaments/sources/right/strength", 2.5),
-                      test::fitted("/skin/layers/film/youngs_modulus", 0.8)};
-    fit.path_deviations = use;
-    return {test::drag_scene(kFrames, {"/colliders/finger/path=null",
-                                       "/colliders/finger/path_file=" + measured_path(seed)}),
-            camera,
-            test::make_tracks(test::drag_scene(kFrames), camera, 4, 0.02, 3),
-            fit,
-            {}};
+    FitInput input = test::small_drag(
+        {"/colliders/finger/path=null", "/colliders/finger/path_file=" + measured_path(seed)});
+    input.options.path_deviations = use;
+    return input;
   }
 
   rhytid::test::TemporaryFolder folder_;
   std::string file_ = folder_ / "path.csv";
 };
-
-/// Intervals of the scene's own parameters that hold the truth.
-int held(const FitResult& result) {
-  int count = 0;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const FittedParameter& p = result.parameters[k];
-    const double truth = get_parameter(test::drag_scene(kFrames), p.address);
-    count += p.low95 <= truth && truth <= p.high95 ? 1 : 0;
-  }
-  return count;
-}
 
 TEST_F(PathDeviationsTest, AreReadBehindTheKnots) {
   EXPECT_FALSE(read_path_deviations(written("time,x,y,z\n0,1,2,3\n")));
@@ -193,7 +175,7 @@ TEST_F(PathDeviationsTest, MakeIntervalsHoldTheTruthThatTheyMissedBefore) {
     ASSERT_TRUE(known.converged && exact.converged);
     EXPECT_THAT(known.notes,
                 Contains(HasSubstr("is in the intervals: finger path offset, finger path by knot")));
-    with += held(known), without += held(exact), all += 2;
+    with += test::intervals_that_hold(known), without += test::intervals_that_hold(exact), all += 2;
     for (const SystematicShift& shift : known.systematic) EXPECT_EQ(shift.failure, "");
     for (std::size_t k = 0; k < 2; ++k) {
       EXPECT_EQ(known.parameters[k].value, exact.parameters[k].value);
@@ -212,7 +194,7 @@ TEST_F(PathDeviationsTest, AreConsideredWhereObservationsAreFewerThanKnots) {
   input.options.consider.reset();
   input.tracks.tracks.resize(2);  // 16 numbers in 4 frames for 2 parameters, and 18 + 1 that are held
   const FitResult found = run_fit(input);
-  ASSERT_EQ(found.systematic.size(), 5u);  // and the layers' thicknesses
+  ASSERT_EQ(found.systematic.size(), 6u);  // and the layers' thicknesses, all together
   for (const SystematicShift& shift : found.systematic) EXPECT_EQ(shift.failure, "") << shift.name;
 }
 
@@ -242,7 +224,7 @@ TEST_F(PathDeviationsTest, FittedOffsetIsKnownBetterThanItsFileSays) {
   std::printf("%s", answer_text(fitted).c_str());
   ASSERT_TRUE(fitted.converged);
   ASSERT_EQ(fitted.parameters.size(), 5u);
-  EXPECT_EQ(held(fitted), 2);
+  EXPECT_EQ(test::intervals_that_hold(fitted), 2);
   EXPECT_THAT(fitted.parameters[2].name, HasSubstr("finger path offset 1"));
   EXPECT_LT(fitted.parameters[2].sigma, 0.9) << "the tracks know more of it than the file";
   EXPECT_EQ(fitted.address_in_clip(fitted.parameters[2], 0), "");

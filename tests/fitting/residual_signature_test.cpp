@@ -58,26 +58,6 @@ TEST(ResidualSignature, IsWhatAFitOfAllTogetherFinds) {
   EXPECT_NEAR(shift.explained, fit.at.residuals.squaredNorm() - left, 1e-8);
 }
 
-TEST(ResidualSignature, ExpectedSquaresAreThoseOfAFitWithPriors) {
-  const Linear fit({3, -0.1}, 1);
-  const MatrixXd squares = expected_squares(fit.at, fit.basis, fit.columns, 4);
-  // The same by a fit of all together, residuals half as large and a row for each prior.
-  MatrixXd all = MatrixXd::Zero(kRows + 2, 4);
-  all.topRows(kRows) << fit.at.jacobian / 2, fit.columns / 2;
-  all.bottomRightCorner(2, 2).setIdentity();
-  VectorXd z = VectorXd::Zero(kRows + 2);
-  z.head(kRows) = fit.at.residuals / 2;
-  const VectorXd together = -all.colPivHouseholderQr().solve(z);
-  const MatrixXd covariance = (all.transpose() * all).inverse();
-  const MatrixXd expected =
-      covariance.bottomRightCorner(2, 2) + together.tail(2) * together.tail(2).transpose();
-  EXPECT_LT((squares - expected).norm(), 1e-9 * expected.norm());
-  EXPECT_GT(squares(0, 0), 4) << "off by more than was thought before";
-  EXPECT_LT(squares(1, 1), 0.2);
-  EXPECT_LT((expected_squares(fit.at, fit.basis, 0.0 * fit.columns, 1) - MatrixXd::Identity(2, 2)).norm(),
-            1e-12);
-}
-
 TEST(ResidualSignature, OfWhatTheParametersDoIsNone) {
   const Linear fit({0.7, -0.2}, 1);
   SystematicShift shift;

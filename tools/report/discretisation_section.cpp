@@ -15,8 +15,8 @@ using fitting::SystematicShift;
 /// The part of a parameter's deviation that the shifts do not make.
 double rest_of_deviation(const FitResult& fit, std::size_t k) {
   double squares = fit.parameters[k].sigma * fit.parameters[k].sigma;
-  for (const SystematicShift& d : fit.systematic)
-    if (d.failure.empty()) squares -= d.shift[k] * d.shift[k];
+  for (const SystematicShift* d : fitting::counted_shifts(fit.systematic))
+    squares -= d->shift[k] * d->shift[k];
   return std::sqrt(std::max(0.0, squares));
 }
 
@@ -78,7 +78,8 @@ void add_discretisation(HtmlPage& page, const ReportData& data) {
       "At the answer the tracks were predicted again with each kind of step of the discretisation finer and "
       "with numbers of the scene that are held without being known exactly off by their deviation, and "
       "differentiated by parameters that are held so and by where paths are. To first order the answer would "
-      "move by what the table says; the intervals have room for it.");
+      "move by what the table says, of what is held by what the residuals leave of its deviation; the "
+      "intervals have room for it.");
   for (const std::string& sentence : fit.misfit) page.paragraph("Misfit: " + sentence);
   page.list(list);
   if (run.empty()) return;
