@@ -233,6 +233,11 @@ struct SizedFrictionLaw {
     return energy;
   }
 
+  /// False without pressure: the traction is zero there, with all its derivatives.
+  bool acts(const double*, const double* prepared, const double*, const double*) const {
+    return prepared[0] > 0;
+  }
+
   /// Contact pressure −∂Ψ/∂g (left alone where the point does not touch) and unit normal, into lag [4]. False, and
   /// nothing written, where the gap has no gradient: at the centre of a sphere, which has no friction hence.
   template <class T>
@@ -258,6 +263,11 @@ struct SizedFrictionLaw {
     const GapAt at = gap_at<sizes>(*shape, u, rest, theta + 3, theta + 9, theta + 17);
     if (!touches(at, value_of(theta[1]), rest[3])) return;
     (void)lag_of(lift_gap<sizes>(at, u, rest, theta + 3, theta + 9, theta + 17), theta, rest, lag);
+  }
+
+  /// False apart from the shape, where the lag is that of a point that does not touch.
+  bool remembers(const double* u, const double* theta, const double* rest) const {
+    return touches(gap_at<sizes>(*shape, u, rest, theta + 3, theta + 9, theta + 17), theta[1], rest[3]);
   }
 
   /// So that a step may be solved again with its own (sim/time/step_passes.h).

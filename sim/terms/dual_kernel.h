@@ -29,6 +29,27 @@ struct DualKernel {
     return v.rest ? v.rest + q * Law::nrest : nullptr;
   }
 
+  /// False where the law says that σ and its derivatives by everything are zero. e [ne]; prepared [nq][np].
+  static bool acts(const Law& law, const ElementView& v, int q, const double* e, const double* prepared) {
+    if constexpr (requires { &Law::acts; })
+      return law.acts(e, prepared + q * np, theta(v, q), rest(v, q));
+    else
+      return true;
+  }
+  /// False where the law says that the derivatives of the new history by everything are zero.
+  static bool remembers(const Law& law, const ElementView& v, int q, const double* e) {
+    if constexpr (requires { &Law::remembers; })
+      return law.remembers(e, theta(v, q), rest(v, q));
+    else
+      return true;
+  }
+  /// False where s_bar [nq][ns] is zero: nobody asks for the history of point q.
+  static bool is_asked(const double* s_bar, int q) {
+    bool any = false;
+    for (int c = 0; c < ns; ++c) any = any || s_bar[q * ns + c] != 0;
+    return any;
+  }
+
   static void point(const ElementView& v, const double (*natural)[max_rows], int q, double* z) {
     double local[nz];
     for (int a = 0; a < 3; ++a)
@@ -40,6 +61,11 @@ struct DualKernel {
     Kin::from_point(p, R == 3 ? v.inverse_jacobian + 9 * q : nullptr, v.weight[q], local);
     for (int a = 0; a < 3; ++a)
       for (int r = 0; r < R; ++r) natural[a][q * R + r] = local[a * R + r];
+  }
+  /// The same for p = 0.
+  static void clear_point(int q, double (*natural)[max_rows]) {
+    for (int a = 0; a < 3; ++a)
+      for (int r = 0; r < R; ++r) natural[a][q * R + r] = 0;
   }
 
   using Directions = Dual<kDirections>;
@@ -76,13 +102,22 @@ struct DualKernel {
 
   /// As PointKernel::tangent.
   static void tangent_by_points(const Law& law, const ElementView& v, const double* u, const double* u_old,
-                                const double* s_old, const double* du, const double* du_old,
-                                const double* ds_old, const double* dtheta, double* df, double* ds_new) {
+                                const double* s_old, const double* prepared, const double* du,
+                                const double* du_old, const double* ds_old, const double* dtheta, double* df,
+                                double* ds_new) {
     double natural[3][max_rows], natural_old[3][max_rows];
     gather<R>(v, u, natural);
     gather<R>(v, u_old, natural_old);
     for (int q = 0; q < v.num_points; ++q) {
-      Directions e[ne], e_old[ne], s[at_least_one(ns)], th[nt], prepared[at_least_one(np)];
+      double z_now[nz], e_now[ne];
+      point(v, natural, q, z_now);
+      Kin::strain(z_now, e_now);
+      const bool in_stress = df && acts(law, v, q, e_now, prepared),
+                 in_history = ns > 0 && ds_new && remembers(law, v, q, e_now);
+      if (ds_new && !in_history)
+        std::memset(ds_new + q * ns * kDirections, 0, sizeof(double) * ns * kDirections);
+      if (!in_stress && !in_history) continue;
+      Directions e[ne], e_old[ne], s[at_least_one(ns)], th[nt], was[at_least_one(np)];
       seed_strain(v, natural_old, du_old, q, e_old);
       if constexpr (ns > 0)
         for (int c = 0; c < ns; ++c) {
@@ -93,14 +128,13 @@ struct DualKernel {
         th[c] = theta(v, q)[c];
         if (dtheta) std::memcpy(th[c].d, dtheta + (q * nt + c) * kDirections, sizeof th[c].d);
       }
-      law.template prepare<Directions>(e_old, s, th, rest(v, q), v.dt, prepared);
-      if (df) {
+      law.template prepare<Directions>(e_old, s, th, rest(v, q), v.dt, was);
+      if (in_stress) {
         Directions sigma[ne];
-        double z[nz], b[ne][nz];
+        double b[ne][nz];
         seed_strain(v, natural, nullptr, q, e);
-        (void)law.template stress<Directions>(e, prepared, th, rest(v, q), v.dt, sigma);
-        point(v, natural, q, z);
-        Kin::strain_gradient(z, b);
+        (void)law.template stress<Directions>(e, was, th, rest(v, q), v.dt, sigma);
+        Kin::strain_gradient(z_now, b);
         Lanes jacobian[9] = {};
         load_jacobian(v, q, jacobian);
         for (int k = 0; k < kDirections; k += kLanes) {
@@ -115,10 +149,10 @@ struct DualKernel {
         }
       }
       if constexpr (ns > 0) {
-        if (ds_new) {
+        if (in_history) {
           Directions s_new[ns];
           seed_strain(v, natural, du, q, e);
-          law.template update<Directions>(e, prepared, th, rest(v, q), v.dt, s_new);
+          law.template update<Directions>(e, was, th, rest(v, q), v.dt, s_new);
           for (int c = 0; c < ns; ++c)
             std::memcpy(ds_new + (q * ns + c) * kDirections, s_new[c].d, sizeof s_new[c].d);
         }
@@ -132,10 +166,16 @@ struct DualKernel {
     if constexpr (ns > 0) {
       double natural[3][max_rows], out[3][max_rows];
       gather<R>(v, u, natural);
+      bool any = false;
       for (int q = 0; q < v.num_points; ++q) {
         double z[nz], e[ne], b[ne][nz], p[nz];
         point(v, natural, q, z);
         Kin::strain(z, e);
+        if (!is_asked(s_bar, q) || !remembers(law, v, q, e)) {
+          clear_point(q, out);
+          continue;
+        }
+        any = true;
         Dual<ne> ed[ne], pd[at_least_one(np)], td[nt], s_new[ns];
         for (int c = 0; c < ne; ++c) ed[c] = Dual<ne>::variable(e[c], c);
         for (int c = 0; c < np; ++c) pd[c] = prepared[q * np + c];
@@ -152,7 +192,7 @@ struct DualKernel {
           p[i] /= v.weight[q];  // put_point multiplies by the weight; this sum has none
         put_point(v, p, q, out);
       }
-      scatter<R>(v, out, u_bar);
+      if (any) scatter<R>(v, out, u_bar);
     }
   }
 
@@ -166,10 +206,20 @@ struct DualKernel {
     gather<R>(v, u, natural);
     gather<R>(v, adj, natural_adj);
     if constexpr (np > 0) gather<R>(v, u_old, natural_old);
+    bool any = false;
     for (int q = 0; q < v.num_points; ++q) {
       double z[nz], e[ne], b[ne][nz], dz[nz], de[ne];
       point(v, natural, q, z);
       Kin::strain(z, e);
+      const bool by_stress = acts(law, v, q, e, prepared),
+                 by_history = is_asked(s_bar, q) && remembers(law, v, q, e);
+      if (!by_stress && !by_history) {
+        if constexpr (np > 0) clear_point(q, out);
+        for (int c = 0; c < ns; ++c) s_old_bar[q * ns + c] = 0;
+        for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] = 0;
+        continue;
+      }
+      any = true;
       Kin::strain_gradient(z, b);
       point(v, natural_adj, q, dz);
       for (int c = 0; c < ne; ++c) {
@@ -182,17 +232,19 @@ struct DualKernel {
         for (int c = 0; c < ne; ++c) ed[c] = e[c];
         for (int c = 0; c < np; ++c) pd[c] = Dual<nd>::variable(prepared[q * np + c], c);
         for (int c = 0; c < nt; ++c) td[c] = Dual<nd>::variable(theta(v, q)[c], np + c);
-        (void)law.template stress<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, sigma);
-        double bar[nd];
-        for (int k = 0; k < nd; ++k) {
-          bar[k] = 0;
-          for (int c = 0; c < ne; ++c) bar[k] -= v.weight[q] * de[c] * sigma[c].d[k];
+        double bar[nd] = {};
+        if (by_stress) {
+          (void)law.template stress<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, sigma);
+          for (int k = 0; k < nd; ++k)
+            for (int c = 0; c < ne; ++c) bar[k] -= v.weight[q] * de[c] * sigma[c].d[k];
         }
         if constexpr (ns > 0) {
-          Dual<nd> s_new[ns];
-          law.template update<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, s_new);
-          for (int k = 0; k < nd; ++k)
-            for (int c = 0; c < ns; ++c) bar[k] += s_bar[q * ns + c] * s_new[c].d[k];
+          if (by_history) {
+            Dual<nd> s_new[ns];
+            law.template update<Dual<nd>>(ed, pd, td, rest(v, q), v.dt, s_new);
+            for (int k = 0; k < nd; ++k)
+              for (int c = 0; c < ns; ++c) bar[k] += s_bar[q * ns + c] * s_new[c].d[k];
+          }
         }
         for (int c = 0; c < np; ++c) prepared_bar[c] = bar[c];
         for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] = bar[np + c];
@@ -221,7 +273,7 @@ struct DualKernel {
         for (int c = 0; c < nt; ++c) theta_bar[q * nt + c] += bar[ne + ns + c];
       }
     }
-    if constexpr (np > 0) scatter<R>(v, out, u_old_bar);
+    if (np > 0 && any) scatter<R>(v, out, u_old_bar);
   }
 };
 

@@ -76,6 +76,11 @@ struct SizedExtrapolatedFrictionLaw : SizedFrictionLaw<sizes> {
     if (value_of(before[1]) == 0 && value_of(before[2]) == 0 && value_of(before[3]) == 0) return;
     for (int i = 0; i < 4; ++i) history[4 + i] = (history[i] - before[i]) * (1 / dt);
   }
+
+  /// Normals are kept of points that do not touch, too: false only where the shape has no support.
+  bool remembers(const double* u, const double* theta, const double* rest) const {
+    return gap_at<sizes>(*this->shape, u, rest, theta + 3, theta + 9, theta + 17).jet.supported;
+  }
 };
 
 using ExtrapolatedFrictionLaw = SizedExtrapolatedFrictionLaw<0>;

@@ -303,7 +303,7 @@ struct PointKernel : DualKernel<Law, Kin> {
       PackedTangent<Law, Kin>::tangent(law, v, u, u_old, s_old, prepared, du, du_old, ds_old, dtheta, df,
                                        ds_new);
     else
-      Points::tangent_by_points(law, v, u, u_old, s_old, du, du_old, ds_old, dtheta, df, ds_new);
+      Points::tangent_by_points(law, v, u, u_old, s_old, prepared, du, du_old, ds_old, dtheta, df, ds_new);
   }
   /// Adds (∂s_new/∂u)ᵀ s_bar to u_bar [n][3].
   static void adjoint_update(const Law& law, const ElementView& v, const double* u, const double* prepared,

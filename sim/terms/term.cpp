@@ -133,6 +133,9 @@ void Term::add_theta_transpose(const StepInfo& step, const TermStepData& data,
     const TermGroup& g = groups_[gi];
     const std::size_t points = static_cast<std::size_t>(g.num_elements) * g.num_points;
     const double* bar = theta_bar.data() + static_cast<std::size_t>(g.first_point) * nt;
+    std::vector<double> sums(nt, 0.0);  // one pass: all slots of a point lie together
+    for (std::size_t q = 0; q < points; ++q)
+      for (int s = 0; s < nt; ++s) sums[s] += bar[q * nt + s];
     for (int s = 0; s < nt; ++s) {
       const ThetaSlot& slot = g.theta[s];
       if (slot.kind == ThetaSlot::Kind::field) {
@@ -143,8 +146,7 @@ void Term::add_theta_transpose(const StepInfo& step, const TermStepData& data,
         continue;
       }
       if (slot.kind == ThetaSlot::Kind::fixed) continue;
-      double sum = 0;
-      for (std::size_t q = 0; q < points; ++q) sum += bar[q * nt + s];
+      const double sum = sums[s];
       if (slot.kind == ThetaSlot::Kind::constant) {
         native_bar[slot.offset] += sum;
       } else {

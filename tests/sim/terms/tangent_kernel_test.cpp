@@ -20,9 +20,9 @@ KernelTable dual_table() {
   using K = PointKernel<Law, PrismKinematics>;
   KernelTable table = kernel_table<Law, PrismKinematics>();
   table.tangent = [](const void* l, const ElementView& v, const double* u, const double* uo, const double* so,
-                     const double*, const double* du, const double* duo, const double* dso, const double* dt,
-                     double* df, double* ds) {
-    K::tangent_by_points(*static_cast<const Law*>(l), v, u, uo, so, du, duo, dso, dt, df, ds);
+                     const double* p, const double* du, const double* duo, const double* dso,
+                     const double* dt, double* df, double* ds) {
+    K::tangent_by_points(*static_cast<const Law*>(l), v, u, uo, so, p, du, duo, dso, dt, df, ds);
   };
   return table;
 }
