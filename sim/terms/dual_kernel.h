@@ -2,7 +2,7 @@
 // faster, and what the tests hold the others against.
 //
 // Shapes   as in point_kernel.h.
-// Tests    tests/sim/terms/term_kernels_test.cpp, tangent_kernel_test.cpp, reverse_kernel_test.cpp
+// Tests    tests/sim/terms/term_kernels_test.cpp, tangent_kernel_test.cpp, reverse_kernel_test.cpp, idle_points_test.cpp
 #pragma once
 
 #include <cstring>
