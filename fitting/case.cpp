@@ -36,6 +36,7 @@ TrackCase read_track(const json& j) {
   TrackCase c;
   c.max_tracks = j["max_tracks"], c.min_distance = j["min_distance"], c.mask_finger = j["mask_finger"];
   c.model = j["model"], c.window = j["window"], c.redetect = j["redetect"];
+  if (j.contains("exposure")) c.exposure = j["exposure"].get<double>();
   if (j.contains("roi")) c.roi = j["roi"].get<std::array<double, 4>>();
   return c;
 }

@@ -79,6 +79,7 @@ struct TrackCase {
   std::string model = "affine";              ///< affine | translation: warp of the window about a point
   int window = 21;                           ///< px, odd: side of the window about a point
   bool redetect = true;                      ///< look for points that were covered or lost
+  std::optional<double> exposure;  ///< share of the frame interval the shutter is open; else found out
 };
 
 /// A cheaper fit before the fit (stages.h).

@@ -245,6 +245,12 @@ std::vector<Rule> track_rules() {
        .type = RuleType::boolean,
        .fallback = c.redetect,
        .doc = "Whether points that were covered or lost are looked for in later frames."},
+      {.pointer = "/track/exposure",
+       .min = 0,
+       .max = 1,
+       .doc = "Share of the frame interval that the shutter is open, whose blur is allowed for: 1/50 s at 25 "
+              "frames a second "
+              "is 0.5; 0: not allowed for; without it, it is found out from the blur."},
       {.pointer = "/track/model",
        .type = RuleType::option,
        .fallback = c.model,

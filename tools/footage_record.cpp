@@ -42,11 +42,11 @@ std::string beside(const std::string& tracks) {
   return (fs::path(tracks).parent_path() / "track.json").string();
 }
 
-/// "model, max_tracks": what differs between two objects.
+/// "model, max_tracks": what differs between two objects. What an earlier program did not know of is null.
 std::string differing(const nlohmann::json& a, const nlohmann::json& b) {
   std::string names;
   for (const auto& [name, value] : b.items())
-    if (!a.contains(name) || a[name] != value) names += (names.empty() ? "" : ", ") + name;
+    if (a.value(name, nlohmann::json()) != value) names += (names.empty() ? "" : ", ") + name;
   return names;
 }
 

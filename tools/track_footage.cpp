@@ -80,6 +80,7 @@ void use_settings(const fitting::TrackCase& track, TrackJob& job) {
   options.seeds.min_distance_px = track.min_distance;
   options.window_px = track.window;
   options.redetect = track.redetect;
+  options.exposure = track.exposure;
   options.model = track.model == "translation" ? fitting::WarpModel::translation : fitting::WarpModel::affine;
   if (!track.roi) return;
   const auto& r = *track.roi;
@@ -121,18 +122,15 @@ nlohmann::json track_settings(const TrackJob& job) {
           {"last frame", job.footage.last}};
 }
 
-TrackJob track_job(const std::string& video, const fitting::TrackCase& track,
-                   std::optional<double> exposure) {
+TrackJob track_job(const std::string& video, const fitting::TrackCase& track) {
   TrackJob job;
-  job.options.exposure = exposure;
   job.footage.path = video;
   use_settings(track, job);
   return job;
 }
 
 TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
-                   Progress& progress, const std::optional<fitting::TrackCase>& asked,
-                   std::optional<double> exposure) {
+                   Progress& progress, const std::optional<fitting::TrackCase>& asked) {
   TrackJob job;
   const std::string of_case = fitting::footage_path(c, folder);
   job.footage.path = video.empty() ? of_case : video;
@@ -156,7 +154,6 @@ TrackJob track_job(const fitting::Case& c, const std::string& folder, const std:
     use_camera(c, job);
   }
   job.of_case = track_settings(job);
-  job.options.exposure = exposure;
   if (asked) use_settings(*asked, job);
   if (job.camera && asked && asked->window != c.track.window)
     use_camera(c, job);  // the windows stay on the skin
@@ -206,6 +203,8 @@ ExitCode track_footage(const TrackJob& job, const std::string& folder, int threa
   std::optional<fitting::ThereAndBack> returned;
   if (job.there_and_back) {
     progress.stage("track back", result.report.frames_processed);
+    options.exposure =
+        result.report.exposure;  // the same both ways, or their difference would count as drift
     returned = fitting::there_and_back(job.footage, result.tracks, options);
     if (!returned) return ExitCode::interrupted;
   }

@@ -28,9 +28,8 @@ struct TrackJob {
   bool there_and_back = false;            ///< also follow the points back to the first frame
 };
 
-/// Of footage without a case: `track` is all there is to say, and `exposure` as TrackerOptions has it.
-TrackJob track_job(const std::string& video, const fitting::TrackCase& track,
-                   std::optional<double> exposure = {});
+/// Of footage without a case: `track` is all there is to say.
+TrackJob track_job(const std::string& video, const fitting::TrackCase& track);
 
 /// What decides the tracks beside the footage, by name; for tracks_record.
 nlohmann::json track_settings(const TrackJob& job);
@@ -40,8 +39,7 @@ nlohmann::json track_settings(const TrackJob& job);
 /// The truth is that of the footage in `folder` which `render` wrote, and of no other video. Throws
 /// InputError.
 TrackJob track_job(const fitting::Case& c, const std::string& folder, const std::string& video,
-                   Progress& progress, const std::optional<fitting::TrackCase>& asked = {},
-                   std::optional<double> exposure = {});
+                   Progress& progress, const std::optional<fitting::TrackCase>& asked = {});
 
 /// Tracks and writes tracks.csv, track.json, overlay.mp4 (or .avi) and overlay.png into `folder`; a summary
 /// on `out`. What track.json says is of the tracks beside it whenever the writing is cut off. ok or

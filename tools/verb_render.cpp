@@ -20,6 +20,7 @@
 #include "tools/render/skin_renderer.h"
 #include "tools/render/truth.h"
 #include "tools/render/twin_run.h"
+#include "tools/share_check.h"
 #include "tools/verb.h"
 
 namespace rhytid::tools {
@@ -73,7 +74,7 @@ class Render : public Verb {
            "share of the frame interval that the shutter is open, about the frame's time: what moves is "
            "blurred (default: 0)")
         ->option_text("FRACTION")
-        ->check(CLI::Range(0.0, 1.0));
+        ->check(share_check());
     add_clip_option(app, clip_);
   }
 

@@ -8,6 +8,7 @@
 #include "fitting/case.h"
 #include "sim/core/error.h"
 #include "tools/clip_argument.h"
+#include "tools/share_check.h"
 #include "tools/track_footage.h"
 #include "tools/verb.h"
 
@@ -66,7 +67,7 @@ class TrackVerb : public Verb {
            "share of the frame interval that the shutter is open, whose blur is allowed for where skin moves "
            "by more than a pixel meanwhile (default: found out from the blur; 0: not allowed for)")
         ->option_text("FRACTION")
-        ->check(CLI::Range(0.0, 1.0));
+        ->check(share_check());
     app.add_flag("--there-and-back", there_and_back_,
                  "also follow the points back from the last frame to the first and say how far from their "
                  "start they end: drift, in px; takes as long again");
@@ -84,13 +85,12 @@ class TrackVerb : public Verb {
     std::string folder = context.output_folder();
     TrackJob job;
     if (context.options.file.empty()) {
-      job = track_job(video_, asked({}), exposure_);
+      job = track_job(video_, asked({}));
     } else {
       const ChosenView chosen =
           chosen_view(fitting::load_case(context.options.file, context.options.settings), clip_, folder);
       folder = chosen.folder;
-      job =
-          track_job(chosen.of_view, folder, video_, context.progress, asked(chosen.of_view.track), exposure_);
+      job = track_job(chosen.of_view, folder, video_, context.progress, asked(chosen.of_view.track));
     }
     job.there_and_back = there_and_back_;
     if (frames_ > 0) job.footage.last = frames_ - 1;
@@ -114,6 +114,7 @@ class TrackVerb : public Verb {
     if (min_distance_ > 0) track.min_distance = min_distance_;
     if (window_ > 0) track.window = window_;
     if (gives_up_) track.redetect = false;
+    if (exposure_) track.exposure = exposure_;
     return track;
   }
 

@@ -160,6 +160,7 @@ void measure_from_previous(const Follower& f, const FlowGuess& guess, double typ
   first->refusal = Refusal::none;
   first->from_previous = true;
   first->new_patch = std::move(patch);
+  first->misfit.setZero();
 }
 
 void accept(const Measurement& m, const ResidualCorrelation& correlation, const FrameView& view,
@@ -168,7 +169,7 @@ void accept(const Measurement& m, const ResidualCorrelation& correlation, const 
     f->renewed = f->common.has_value();  // a template cut in the first frame is the first again
     f->template_gradient = f->warp.gradient * f->template_gradient;
     f->patch = m.new_patch;
-    f->has_first_template = false;
+    f->has_first_template = !f->common.has_value();
     f->baseline = 0;
   }
   f->residual = m.alignment.residual_rms;

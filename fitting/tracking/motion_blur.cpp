@@ -12,9 +12,64 @@ namespace {
 constexpr double kShortest = 0.7;
 /// A window tells how long the shutter is open when it would be blurred by this if that were always.
 constexpr double kTelling = 2;
+/// And that is so many times what deformation does to the smoothing of the pictures.
+constexpr double kClear = 5;
 
 bool is_ok(const Observation& o) {
   return o.status == TrackStatus::ok;
+}
+
+/// Whether `next` goes on from `here` smoothly enough to extrapolate: else something began or stopped between them.
+bool agree(const Vec2& here, const Vec2& next) {
+  return (next - here).norm() <= 0.5 * here.norm();
+}
+
+/// Speed at the outer end of a frame interval, from the motion in it and in the one beside it: to second order, or where that
+/// is no smooth motion the mean of the interval.
+Vec2 speed_at_end(const Vec2& interval, const Vec2& beside) {
+  return agree(interval, beside) ? Vec2(1.5 * interval - 0.5 * beside) : interval;
+}
+
+/// The acceleration in a frame, if it is that of a smooth motion; and by how much the speed may jump there.
+struct Bend {
+  Vec2 acceleration = Vec2::Zero(), jump = Vec2::Zero();
+};
+
+/// Of observation i, px per frame²; nothing of neither where too little was seen beside it.
+Bend bend_at(const std::vector<Observation>& list, std::size_t i) {
+  const auto seen = [&](std::size_t k) {  // k may have passed below 0
+    return k - 1 < list.size() && k + 1 < list.size() && is_ok(list[k - 1]) && is_ok(list[k]) &&
+           is_ok(list[k + 1]);
+  };
+  const auto second = [&](std::size_t k) -> Vec2 {
+    return list[k + 1].pixel - 2 * list[k].pixel + list[k - 1].pixel;
+  };
+  if (seen(i)) {
+    const Vec2 here = second(i);
+    const bool before = seen(i - 1), after = seen(i + 1);
+    const Vec2 earlier = before ? second(i - 1) : Vec2::Zero(), later = after ? second(i + 1) : Vec2::Zero();
+    const auto of_motion = [&](const Vec2& difference) { return Bend{here, difference}; };
+    if (before && after && agree(here, earlier) && agree(here, later))
+      return of_motion((earlier - here).norm() > (later - here).norm() ? earlier - here : later - here);
+    // Next to an end two on the other side have to go on, since a jump between two frames shows in both alike.
+    if (before && !after && seen(i - 2) && agree(here, earlier) && agree(earlier, second(i - 2)))
+      return of_motion(earlier - here);
+    if (after && !before && seen(i + 2) && agree(here, later) && agree(later, second(i + 2)))
+      return of_motion(later - here);
+    // All of the jump, whose differences spread over two frames or three.
+    return {Vec2::Zero(), earlier + here + later};
+  }
+  // At the ends of what was seen without a gap straight on from those beside, if these are of one motion.
+  const bool forth = seen(i + 1);
+  const std::size_t next = forth ? i + 1 : i - 1, after = forth ? i + 2 : i - 2;
+  if (!seen(next)) return {};
+  const Vec2 near = second(next);
+  // What rests has no acceleration yet.
+  if ((list[next].pixel - list[i].pixel).norm() < 0.25 * near.norm()) return {};
+  if (!seen(after)) return {Vec2::Zero(), near};
+  const Vec2 far = second(after);
+  if (agree(near, far)) return {2 * near - far, far - near};
+  return {Vec2::Zero(), (far - near).norm() < near.norm() ? Vec2(far - near) : near};
 }
 
 /// Variance of noise of a frame that is averaged along a line, over that of the frame: the mean of its autocorrelation
@@ -28,6 +83,16 @@ double noise_left(double length, double smoothing_px) {
     sum += 2 * (1 - share) * std::exp(-d * d / (4 * s * s)) / kPieces;
   }
   return sum;
+}
+
+/// By how much a picture that is smoothed as it is has other second moments than the template, px² of the template, because
+/// skin is deformed meanwhile: the largest eigenvalue of s² (A⁻¹A⁻ᵀ − I), by size.
+double smoothing_change(const Eigen::Matrix2d& gradient, double smoothing_px) {
+  const Eigen::Matrix2d inverse = gradient.inverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(inverse * inverse.transpose(),
+                                                             Eigen::EigenvaluesOnly);
+  const double pixel = 1. / 12;  // which averages too
+  return (smoothing_px * smoothing_px + pixel) * (eigen.eigenvalues().array() - 1).abs().maxCoeff();
 }
 
 }  // namespace
@@ -61,11 +126,15 @@ std::optional<Motions> motions_of(const Follower& f, const Vec2& place) {
     return std::nullopt;
   if (n > 2 && !is_ok(seen[2])) return std::nullopt;
   const Vec2& third = n > 2 ? seen[2].pixel : place;
-  // By differences of the two frame intervals beside, to second order.
-  const Vec2 first = 1.5 * (seen[1].pixel - seen[0].pixel) - 0.5 * (third - seen[1].pixel);
+  const Vec2 first = speed_at_end(seen[1].pixel - seen[0].pixel, third - seen[1].pixel);
   const Vec2 step = place - seen[n - 1].pixel;
   if (!is_ok(seen[n - 2])) return Motions{first, step};
-  return Motions{first, 1.5 * step - 0.5 * (seen[n - 1].pixel - seen[n - 2].pixel)};
+  return Motions{first, speed_at_end(step, seen[n - 1].pixel - seen[n - 2].pixel)};
+}
+
+double noise_after(const RelativeBlur& blur, const TrackerOptions& o) {
+  return 0.5 * (noise_left(blur.of_template.norm(), o.smoothing_px) +
+                noise_left(blur.of_image.norm(), o.smoothing_px));
 }
 
 Measurement measure_blurred(const Follower& f, const PatchWarp& start, const RelativeBlur& blur,
@@ -99,16 +168,16 @@ Measurement measure_blurred(const Follower& f, const PatchWarp& start, const Rel
 std::optional<std::array<double, 5>> Shutter::compare(const Follower& f, const Alignment& a,
                                                       const FrameView& view, const TrackerOptions& o) {
   const std::optional<Motions> motions = motions_of(f, a.warp.centre);
-  if (!motions || relative_blur(motions->first, motions->now, a.warp.gradient, 1).longest() < kTelling)
+  if (!motions) return std::nullopt;
+  const double line = relative_blur(motions->first, motions->now, a.warp.gradient, 1).longest();
+  if (line < kTelling || line * line / 12 < kClear * smoothing_change(a.warp.gradient, o.smoothing_px))
     return std::nullopt;
   std::array<double, 5> costs{};
   for (std::size_t k = 0; k < costs.size(); ++k) {
     const RelativeBlur blur = relative_blur(motions->first, motions->now, a.warp.gradient, kCandidates[k]);
     const Measurement m = measure_blurred(f, a.warp, blur, view, o);
     if (m.refusal != Refusal::none) return std::nullopt;
-    const double left = 0.5 * (noise_left(blur.of_template.norm(), o.smoothing_px) +
-                               noise_left(blur.of_image.norm(), o.smoothing_px));
-    costs[k] = std::log(m.alignment.residual_rms * m.alignment.residual_rms / left);
+    costs[k] = std::log(m.alignment.residual_rms * m.alignment.residual_rms / noise_after(blur, o));
   }
   return costs;
 }
@@ -133,24 +202,16 @@ double Shutter::exposure() const {
 
 void remove_acceleration(double exposure, Track* track) {
   auto& list = track->observations;
-  std::vector<std::optional<Vec2>> bend(list.size());
-  for (std::size_t i = 1; i + 1 < list.size(); ++i)
-    if (is_ok(list[i - 1]) && is_ok(list[i]) && is_ok(list[i + 1]))
-      bend[i] = list[i + 1].pixel - 2 * list[i].pixel + list[i - 1].pixel;
-  // At the ends of what was seen without a gap straight on from those beside.
-  const auto seen = [&](std::size_t i) {
-    return i < bend.size() && bend[i].has_value();
-  };  // i may have passed below 0
-  const auto extended = [&](std::size_t i) -> Vec2 {
-    if (seen(i)) return *bend[i];
-    if (seen(i + 1)) return seen(i + 2) ? Vec2(2 * *bend[i + 1] - *bend[i + 2]) : *bend[i + 1];
-    if (seen(i - 1)) return seen(i - 2) ? Vec2(2 * *bend[i - 1] - *bend[i - 2]) : *bend[i - 1];
-    return Vec2::Zero();
-  };
   if (list.empty()) return;
-  const Vec2 of_first = extended(0);
-  for (std::size_t i = 1; i < list.size(); ++i)
-    if (is_ok(list[i])) list[i].pixel -= exposure * exposure / 24 * (extended(i) - of_first);
+  std::vector<Bend> bends;
+  for (std::size_t i = 0; i < list.size(); ++i) bends.push_back(bend_at(list, i));
+  const double e = exposure;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (!is_ok(list[i])) continue;
+    list[i].pixel -= e * e / 24 * (bends[i].acceleration - bends[0].acceleration);
+    // A jump Δ at any time of the frame, all alike, puts the mean off by e³ΔΔᵀ/320 in the mean square.
+    list[i].covariance += e * e * e / 320 * bends[i].jump * bends[i].jump.transpose();
+  }
 }
 
 }  // namespace rhytid::fitting

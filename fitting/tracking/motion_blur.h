@@ -9,9 +9,10 @@
 // which has a positive eigenvalue, by whose line the template is blurred, and a negative one, by whose line the frame is: each
 // by what the other is blurred more, and none where both moved alike. Exact, for an even motion, where one of them stood still.
 //
-// e is that of five values for which residuals of the windows that tell are least, all frames so far together, with what
-// blurring takes of their noise allowed for; or it is given. A mean over the exposure is e² a/24 off the place at its middle, a the acceleration
-// in px per frame²; that is taken off.
+// e is given, or that for which residuals of the windows that tell are least, a parabola through five values, with what
+// blurring takes of their noise allowed for: every third window of the frames so far, until Shutter::kEnough are known. A mean over
+// the exposure is e² a/24 off the place at its middle, a the acceleration in px per frame²; that is taken off. Where speed jumps
+// there is no such a: what a jump may do is in the covariance.
 //
 // Units  px, frames.   Tests  tests/fitting/tracking/motion_blur_test.cpp
 #pragma once
@@ -34,7 +35,7 @@ struct RelativeBlur {
 RelativeBlur relative_blur(const Vec2& first, const Vec2& now, const Eigen::Matrix2d& gradient,
                            double exposure);
 
-/// Motions per frame of a follower in the first frame and now, if it was seen in this frame at `place`, and in the first two
+/// Motions per frame of a follower in the first frame and now, if it was seen in this frame at `place`, and in the first three
 /// and the last one. Nothing when it was not, or has another template.
 struct Motions {
   Vec2 first, now;
@@ -44,6 +45,9 @@ std::optional<Motions> motions_of(const Follower& follower, const Vec2& place);
 /// Covariance of what the lines leave, px²: 0.0045 px for every px² of a line's length, along it. Light is not averaged as grey
 /// values are, and the window does not move as one. Found on bench tracker's speckle.
 Eigen::Matrix2d blur_misfit(const RelativeBlur& blur);
+
+/// Variance of the noise of a residual between pictures averaged along the lines, over that without.
+double noise_after(const RelativeBlur& blur, const TrackerOptions& options);
 
 /// Aligns template and frame, each averaged along its line, from `start` on.
 Measurement measure_blurred(const Follower& follower, const PatchWarp& start, const RelativeBlur& blur,
@@ -69,7 +73,7 @@ class Shutter {
   int windows_ = 0;
 };
 
-/// Takes e² a/24 off the positions of a track, against that of its first.
+/// Takes e² a/24 off the positions of a track, against that of its first, and adds to covariances what jumps of speed may do.
 void remove_acceleration(double exposure, Track* track);
 
 }  // namespace rhytid::fitting

@@ -216,6 +216,9 @@ class Run {
       if (blur.longest() == 0 || blur.longest() > f.patch.half) return;
       Measurement again = measure_blurred(f, start, blur, view, o_);
       if (again.refusal != Refusal::none) return;
+      // Where motion is not what its differences say, blurring fits worse.
+      const double before = m.alignment.residual_rms, after = again.alignment.residual_rms;
+      if (after * after > noise_after(blur, o_) * before * before) return;
       m.alignment = std::move(again.alignment);
       m.misfit = blur_misfit(blur);
     });

@@ -15,7 +15,8 @@ struct SurfacePoint {
   double distance = 0;              ///< |point − position|, mm
 };
 
-/// Closest point to `position` (mm) on the triangles; ties go to the lowest triangle index. nodes [n][3] mm.
+/// Closest point to `position` (mm) on the triangles; among distances that are equal within rounding (8 ε) the foot of a perpendicular wins
+/// over a border's point, else the lowest triangle index. nodes [n][3] mm.
 /// Degenerate triangles count as their edges. Brute force with box rejection, O(triangles) per call. Throws
 /// ContractError when there is no triangle, an index is out of range or something is not finite.
 SurfacePoint project_to_surface(const MatrixX3& nodes, const std::vector<std::array<int, 3>>& triangles,

@@ -88,6 +88,9 @@ expect 2 1 '^rhytid: error: --roi: got 0,0,1e\+12,1e\+12, expected .* from 0 to 
 expect 2 1 '^rhytid: error: --model' track case.json -o a --model rigid
 expect 2 1 '^rhytid: error: --exposure' track case.json -o a --exposure 1.5
 expect 2 1 '^rhytid: error: --exposure' render case.json -o a --exposure -0.5
+expect 2 1 '^rhytid: error: --exposure: got nan, expected a number from 0 to 1' render case.json -o a --exposure nan
+expect 2 1 '^rhytid: error: --exposure: got nan, expected a number from 0 to 1' track case.json -o a --exposure nan
+expect 2 1 'error: case.json (--set): /track/exposure: got 1.5, expected' track case.json -o a --set /track/exposure=1.5
 expect 2 1 '/track/roi: got \[0.0,0.0,0.0,5.0\], expected' track case.json -o a --set '/track/roi=[0, 0, 0, 5]'
 
 # The main job, tracking included.

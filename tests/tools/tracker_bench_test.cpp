@@ -83,6 +83,40 @@ TEST(Filming, TimeIsTheMiddleOfTheExposure) {
   EXPECT_GT(speed.norm(), 5);  // taken at the beginning of the exposure it would be off by half of this
 }
 
+/// Mean square of the places of a bright spot's light along x, less that of its centre.
+double spread(const cv::Mat& levels) {
+  cv::Mat light;
+  cv::pow(levels / 255, kGamma, light);
+  const cv::Moments m = cv::moments(light);
+  return m.mu20 / m.m00;
+}
+
+// A point that moves by v draws a line of e v, whose mean square is e²v²/12.
+TEST(Filming, LinesHaveTheirLength) {
+  cv::Mat spot(400, 480, CV_32F);
+  for (int y = 0; y < spot.rows; ++y)
+    for (int x = 0; x < spot.cols; ++x)
+      spot.at<float>(y, x) = static_cast<float>(
+          255 * std::pow(std::exp(-((x - 240.) * (x - 240.) + (y - 200.) * (y - 200.)) / 200.), 1 / kGamma));
+  const auto skin = make_plane_skin(spot, 2, kSize, 9, kInner);
+  Filming f = filming("head_5_open_1");
+  f.head.turn = f.head.zoom = 0;
+  f.head.period = 1000;
+  f.head.shift_px = 1500;
+  f.exposure = 0;
+  const double sharp = spread(filmed_levels(*skin, f, 4));
+  HeadRoll head = f.head;
+  const Vec2 middle(kSize.width / 2., kSize.height / 2.);
+  head.centre = middle;
+  const auto path = skin->path(middle, head);
+  const double v = 0.5 * (path[5].x() - path[3].x());
+  ASSERT_GT(v, 8);
+  for (const double e : {0.25, 0.5, 1.0}) {
+    f.exposure = e;
+    EXPECT_NEAR((spread(filmed_levels(*skin, f, 4)) - sharp) / (e * e * v * v / 12), 1, 0.05) << e;
+  }
+}
+
 TEST(TrackerBench, PlainFootageHasTheErrorsThatAreStated) {
   const TrackingScore s = score("plain");
   EXPECT_EQ(s.kept, 1);

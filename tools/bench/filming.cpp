@@ -177,13 +177,14 @@ cv::Mat filmed_levels(const FilmedSkin& skin, const Filming& filming, int frame)
   const cv::Size size = skin.size();
   const HeadRoll head = head_of(filming, size);
   const int parts = static_cast<int>(std::lround(filming.exposure * kSubframes));
+  require(parts % 2 == 0, "filmed_levels: an exposure of an even number of subframes");
   const double flicker =
       filming.flicker.empty() ? 1 : filming.flicker[static_cast<size_t>(frame) % filming.flicker.size()];
   cv::Mat sum = cv::Mat::zeros(size, CV_32F);
   for (int k = 0; k <= parts; ++k) {
-    // Trapezoids over the exposure, whose middle is the frame's time.
+    // Simpson's rule over the exposure, whose middle is the frame's time: a line has its second moment.
     const double t = frame + (k - parts / 2.) / kSubframes, time = time_of(t, skin.frames());
-    const double weight = parts == 0 ? 1 : (k == 0 || k == parts ? 0.5 : 1.0) / parts;
+    const double weight = parts == 0 ? 1 : (k == 0 || k == parts ? 1 : k % 2 == 1 ? 4 : 2) / (3. * parts);
     cv::Mat light = skin.light(t, head);
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x) {

@@ -11,6 +11,7 @@
 #include "sim/output/plot.h"
 #include "sim/output/text.h"
 #include "tools/bench/filming.h"
+#include "tools/share_check.h"
 #include "tools/text_table.h"
 
 namespace rhytid::tools {
@@ -160,7 +161,7 @@ class TrackerBenchmark : public Benchmark {
     app.add_option("--exposure", exposure_,
                    "track with --exposure FRACTION (default: found out from the blur)")
         ->option_text("FRACTION")
-        ->check(CLI::Range(0.0, 1.0));
+        ->check(share_check());
     app.add_option("--seed", seed_, "of texture and noise (default 1)");
   }
 
