@@ -90,7 +90,7 @@ expect 2 1 '^rhytid: error: --exposure' track case.json -o a --exposure 1.5
 expect 2 1 '^rhytid: error: --exposure' render case.json -o a --exposure -0.5
 expect 2 1 '^rhytid: error: --exposure: got nan, expected a number from 0 to 1' render case.json -o a --exposure nan
 expect 2 1 '^rhytid: error: --exposure: got nan, expected a number from 0 to 1' track case.json -o a --exposure nan
-expect 2 1 'error: case.json (--set): /track/exposure: got 1.5, expected' track case.json -o a --set /track/exposure=1.5
+expect 2 1 '/track/exposure: got 1.5, expected' track case.json -o a --set /track/exposure=1.5
 expect 2 1 '/track/roi: got \[0.0,0.0,0.0,5.0\], expected' track case.json -o a --set '/track/roi=[0, 0, 0, 5]'
 
 # The main job, tracking included.
@@ -134,7 +134,16 @@ mkdir c && cp a/{camera.yaml,tracks.csv,track.json} c && cp a/footage.avi A.avi
 few() { expect 3 0 "$1" fit case.json -o c --max-evaluations 1 "${@:2}"; }
 few 'cost' --set /footage=A.avi
 grep -q tracking err.txt && fail "valid tracks were not taken: $(cat err.txt)"
-few 'c/tracks.csv is made with other max_tracks: tracking A.avi again' --set /footage=A.avi --set /track/max_tracks=10
+python3 - <<'PYTHON'
+import json
+record = json.load(open("c/track.json"))
+del record["settings"]["exposure"], record["case_settings"]["exposure"]  # of a program that did not know of it
+json.dump(record, open("c/track.json", "w"))
+PYTHON
+few 'cost' --set /footage=A.avi
+grep -q tracking err.txt && fail "tracks of an earlier program were not taken: $(cat err.txt)"
+few 'c/tracks.csv is made with other exposure: tracking A.avi again' --set /footage=A.avi --set /track/exposure=0
+few 'c/tracks.csv is made with other exposure, max_tracks: tracking A.avi again' --set /footage=A.avi --set /track/max_tracks=10
 few 'is made with other max_tracks, roi:' --set /footage=A.avi --set '/track/roi=[0, 0, 159, 119]'
 few 'is made with other masks of skin and finger, roi:' --set /footage=A.avi --set /track/mask_finger=false
 few 'is made with other masks of skin and finger:' --set /footage=A.avi

@@ -151,6 +151,8 @@ TEST(TrackerBench, ErrorsOfCompressedVideoAreStated) {
 // 0.10 px for 0.17 on the whole film; what is left is stated.
 TEST(TrackerBench, OpenShuttersAreAllowedFor) {
   const TrackingScore without = score("head_5_open_1", 12, 0), with = score("head_5_open_1", 12);
+  EXPECT_EQ(without.exposure, 0);
+  EXPECT_NEAR(with.exposure, 1, 0.15);
   EXPECT_LT(with.rms_px, 0.75 * without.rms_px);
   EXPECT_LE(with.gross, without.gross);
   EXPECT_LT(with.normalised, 1.4);

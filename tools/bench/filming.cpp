@@ -227,6 +227,7 @@ TrackingScore score_filming(const FilmedSkin& skin, const Filming& filming, fitt
   score.refusals = result.report.refusals;
   score.template_updates = result.report.template_updates, score.redetected = result.report.redetected;
   score.noise_grey = result.report.noise_grey, score.jitter_px = result.report.jitter_px;
+  score.exposure = result.report.exposure;
   compare(skin, filming, result.tracks, &score);
   return score;
 }

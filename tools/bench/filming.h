@@ -52,8 +52,8 @@ struct TrackingScore {
   int gross = 0;         ///< more than 1 px off
   /// Root of the mean of eᵀ Σ⁻¹ e / 2: of all but gross ones, and of all.
   double normalised = 0, normalised_all = 0;
-  double sigma_px = 0;                   ///< median stated, per axis
-  double noise_grey = 0, jitter_px = 0;  ///< as the tracker reports them
+  double sigma_px = 0;                                 ///< median stated, per axis
+  double noise_grey = 0, jitter_px = 0, exposure = 0;  ///< as the tracker reports them
   std::array<int, fitting::kNumRefusals> refusals{};
   int template_updates = 0, redetected = 0;
 };

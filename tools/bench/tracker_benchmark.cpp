@@ -59,12 +59,12 @@ std::string markdown(const std::vector<TrackingScore>& scores) {
 }
 
 void write_csv(const std::string& path, const std::vector<TrackingScore>& scores) {
-  std::vector<CsvColumn> columns = {{"skin", ""},       {"filming", ""},  {"tracks", ""},
-                                    {"kept", ""},       {"expected", ""}, {"observations", ""},
-                                    {"rms", "px"},      {"bias", "px"},   {"sigma", "px"},
-                                    {"normalised", ""}, {"gross", ""},    {"normalised_with_gross", ""},
-                                    {"noise", "grey"},  {"jitter", "px"}, {"template_updates", ""},
-                                    {"redetected", ""}};
+  std::vector<CsvColumn> columns = {
+      {"skin", ""},      {"filming", ""},      {"tracks", ""},   {"kept", ""},
+      {"expected", ""},  {"observations", ""}, {"rms", "px"},    {"bias", "px"},
+      {"sigma", "px"},   {"normalised", ""},   {"gross", ""},    {"normalised_with_gross", ""},
+      {"noise", "grey"}, {"jitter", "px"},     {"exposure", ""}, {"template_updates", ""},
+      {"redetected", ""}};
   for (int i = 1; i < fitting::kNumRefusals; ++i)
     columns.push_back({std::string("refused_") + to_string(static_cast<fitting::Refusal>(i)), ""});
   CsvTable table(columns);
@@ -84,6 +84,7 @@ void write_csv(const std::string& path, const std::vector<TrackingScore>& scores
                                 s.normalised_all,
                                 s.noise_grey,
                                 s.jitter_px,
+                                s.exposure,
                                 whole(s.template_updates),
                                 whole(s.redetected)};
     for (int i = 1; i < fitting::kNumRefusals; ++i) row.push_back(whole(s.refusals[static_cast<size_t>(i)]));
