@@ -1,9 +1,9 @@
 // Footage of a moving skin: textured, lit from the side, with the finger, its shadow, and camera noise.
 //
 //   colour = albedo · (ambient · occlusion + key · shadow · wrapped cosine) + a weak gloss,
-// summed in linear light over the samples of a pixel and over the pictures of an exposure (exposure.h), encoded as sRGB, then noise of the given deviation in
-// grey levels. Everything random is a hash of seed, frame and place, so that a frame is the same bits
-// whatever the number of threads.
+// summed in linear light over the samples of a pixel and over the pictures of an exposure (exposure.h), encoded as
+// sRGB, then noise of the given deviation in grey levels. Everything random is a hash of seed, frame and place, so that
+// a frame is the same bits whatever the number of threads.
 #pragma once
 
 #include <vector>
