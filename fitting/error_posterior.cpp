@@ -15,6 +15,7 @@ namespace {
 constexpr double kLeastPart = 1e-6;
 
 MatrixXd positive_part(const MatrixXd& symmetric) {
+  if (symmetric.size() == 0) return symmetric;  // no parameter is told; Eigen's solver wants one
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(symmetric);
   const MatrixXd& v = eigen.eigenvectors();
   return v * eigen.eigenvalues().cwiseMax(0).asDiagonal() * v.transpose();
@@ -72,20 +73,29 @@ ErrorPosterior error_posterior(const FitProblem::Linearised& at, const MatrixXd&
   const VectorXd score = -eigen.eigenvectors().transpose() * (own.transpose() * at.residuals);
   const double least = kLeastPart * kLeastPart * columns.colwise().squaredNorm().maxCoeff();
   int seen = 0;
-  VectorXd explained = VectorXd::Zero(information.size());  // of |z|², along each
+  double explained = 0;  // of |z|²
   for (Eigen::Index k = 0; k < information.size(); ++k) {
     if (!(information[k] > least)) continue;
-    explained[k] = score[k] * score[k] / information[k];
+    explained += score[k] * score[k] / information[k];
     ++seen;
   }
   const double widening = interval_widening(
-      std::max(0.0, at.residuals.squaredNorm() - explained.sum()) / std::max(1, degrees_of_freedom - seen),
+      std::max(0.0, at.residuals.squaredNorm() - explained) / std::max(1, degrees_of_freedom - seen),
       autocorrelation);
   const double noise = widening * widening;
   const VectorXd told = information.array() / (information.array() + noise);
   ErrorPosterior found;
-  found.variance = noise;
-  if (seen > 0) found.variance += kFirstOrder * kFirstOrder * told.dot(explained) / told.sum();
+  // w² falls on the right-hand side, so that there is one solution, between these.
+  const auto with_missed = [&](double w2) {
+    const VectorXd believed = score.cwiseQuotient(VectorXd(information.array() + w2));
+    return noise + kFirstOrder * kFirstOrder * information.dot(believed.cwiseAbs2()) / told.sum();
+  };
+  double low = noise, high = seen > 0 ? with_missed(noise) : noise;
+  for (int halving = 0; halving < 100 && low < high; ++halving) {
+    const double middle = 0.5 * (low + high);
+    (with_missed(middle) > middle ? low : high) = middle;
+  }
+  found.variance = high;
   const VectorXd variances = (information.array() / found.variance + 1).inverse();
   const VectorXd mean = variances.cwiseProduct(score) / found.variance;
   found.mean = eigen.eigenvectors() * mean;
@@ -101,7 +111,10 @@ void weigh_by_residuals(const FitProblem::Linearised& at, const MatrixXd& basis,
     count += shift.columns.cols();
     holds_any = holds_any || (shift.is_held() && shift.columns.cols() > 0);
   }
-  if (!holds_any) return;
+  if (!holds_any) {
+    for (SystematicShift& shift : shifts) shift.columns.resize(0, 0);
+    return;
+  }
   MatrixXd columns(at.residuals.size(), count);
   std::vector<bool> is_held;
   for (SystematicShift& shift : shifts) {

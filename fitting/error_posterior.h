@@ -11,13 +11,14 @@
 // An error without a part of its own in A counts in full, as in a consider covariance (Schmidt 1966); one that is told
 // counts by what it is told to be; σ = 0 is exact, and more σ is more width where nothing else competes.
 //
-//   w² = w_0² + f² e/γ,   w_0² = max(1, |z_⊥|²/(degrees of freedom − rank A)) (1 + ρ)/(1 − ρ)
-//   e = zᵀA (AᵀA + w_0²)⁻¹ Aᵀz,   γ = tr (AᵀA + w_0²)⁻¹ AᵀA
+//   w² = w_0² + f² |Aû|²/γ,   w_0² = max(1, |z_⊥|²/(degrees of freedom − rank A)) (1 + ρ)/(1 − ρ)
+//   γ = tr (AᵀA + w_0²)⁻¹ AᵀA
 //
 // w_0² is the noise as the fit has it for intervals, of the residuals z_⊥ that none of the errors explains, whatever is said of
-// their size. Of the e that they explain, first order misses f² (kFirstOrder), in any of the γ directions that residuals
-// tell: with the noise alone residuals are believed far beyond what linear columns can say, of finer steps too. So a thing that is off by
-// many times what is said of it is not told in full: alone, by three σ 1.8, by ten 1.4; with others told besides more.
+// their size. Of what is believed of them, first order misses f² (kFirstOrder), in any of the γ directions that residuals
+// tell: with the noise alone residuals are believed far beyond what linear columns can say, of finer steps too. û depends on
+// w², which is the one solution of this. So a thing that is off by many times what is said of it is not told in full: alone, by
+// three σ 2.2, by ten 4.1; but the further off, the wider.
 //
 // The residuals of coarse steps look like many things. So û of finer steps is not believed where that would narrow
 // anything: the covariance is the least one that is nowhere below either of D E[u uᵀ | z] Dᵀ and the same with
@@ -37,6 +38,7 @@ namespace rhytid::fitting {
 /// data/scenes/recovery_swipe with a layer and with one 10 % thicker residuals change by 0.3 otherwise than its column says.
 inline constexpr double kFirstOrder = 0.3;
 
+/// What the residuals leave of errors, in their deviations.
 struct ErrorPosterior {
   VectorXd mean;                                                             ///< û [errors]
   MatrixXd covariance;                                                       ///< V [errors][errors]

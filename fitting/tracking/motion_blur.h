@@ -43,7 +43,8 @@ struct Motions {
 std::optional<Motions> motions_of(const Follower& follower, const Vec2& place);
 
 /// Covariance of what the lines leave, px²: 0.0045 px for every px² of a line's length, along it. Light is not averaged as grey
-/// values are, and the window does not move as one. Found on bench tracker's speckle.
+/// values are, and the window does not move as one. Found on bench tracker's speckle, where it is too large since its films are
+/// blurred as they say (0.5 to 1 deviations); on the twin and the face it is too small: a compromise.
 Eigen::Matrix2d blur_misfit(const RelativeBlur& blur);
 
 /// Variance of the noise of a residual between pictures averaged along the lines, over that without.

@@ -2,7 +2,6 @@
 // where errors cannot be seen, compete, or are those of finer steps.
 #include "fitting/error_posterior.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -16,8 +15,6 @@
 
 namespace rhytid::fitting {
 namespace {
-
-using testing::HasSubstr;
 
 constexpr Eigen::Index kRows = 200;
 constexpr int kDegrees = 198;
@@ -88,10 +85,9 @@ TEST(ErrorPosterior, VarianceIsThatOfWhatIsLeftAndOfWhatFirstOrderMisses) {
   const double noise = std::max(1.0, left / (kDegrees - 2));
   const MatrixXd normal = own.transpose() * own, one = MatrixXd::Identity(2, 2);
   const MatrixXd prior = (normal + noise * one).inverse();
-  const VectorXd score = own.transpose() * fit.at.residuals;
-  const double explained = score.dot(prior * score), told = (prior * normal).trace();
-  EXPECT_GT(explained, 20);
-  EXPECT_NEAR(found.variance, noise + kFirstOrder * kFirstOrder * explained / told, 1e-9 * found.variance);
+  const double believed = (own * found.mean).squaredNorm(), told = (prior * normal).trace();
+  EXPECT_GT(believed, 20);
+  EXPECT_NEAR(found.variance, noise + kFirstOrder * kFirstOrder * believed / told, 1e-9 * found.variance);
   // Residuals that repeat each other tell less.
   EXPECT_GT(error_posterior(fit.at, fit.basis, fit.columns, kDegrees, 0.5).covariance.trace(),
             found.covariance.trace());
@@ -148,6 +144,43 @@ TEST(ErrorPosterior, LessDeviationIsLessWidth) {
       wider = width;
     }
     EXPECT_NEAR(wider, off, 0.3) << "of so little knowledge residuals tell all";
+  }
+}
+
+// The further a thing is off from what is said of it, the wider.
+TEST(ErrorPosterior, MoreIsOffIsMoreWidth) {
+  const MatrixXd column = 30 * two().col(0);  // told well
+  double wider = 0;
+  for (const double off : {0., 1., 2., 3., 5., 10., 20., 50., 200.}) {
+    const Linear fit(column, VectorXd::Constant(1, off), 3);
+    const double left = std::sqrt(fit.posterior().squares()(0, 0));
+    EXPECT_GT(left, wider) << off;
+    EXPECT_LE(left, std::max(1., 1.1 * off)) << off;
+    wider = left;
+  }
+}
+
+// Parameters that the residuals do not tell at all, or only together.
+TEST(ErrorPosterior, JacobiansWithoutFullRankAreTaken) {
+  for (const int rank : {0, 1}) {
+    FitProblem::Linearised at;
+    at.residuals = random(1, 3);
+    at.jacobian = MatrixXd::Zero(kRows, 2);
+    MatrixXd basis(2, rank);
+    if (rank == 1) {
+      at.jacobian = random(1, 4) * Eigen::RowVector2d(1, 1);
+      basis = Eigen::Vector2d(0.5, 0.5) / random(1, 4).norm();
+    }
+    std::vector<SystematicShift> shifts(2);
+    shifts[0].name = "plane", shifts[1].name = "held b";
+    for (std::size_t s = 0; s < 2; ++s) {
+      shifts[s].columns = random(1, 5 + static_cast<unsigned>(s));
+      const VectorXd moved = -basis * (basis.transpose() * (at.jacobian.transpose() * shifts[s].columns));
+      shifts[s].shift.assign(moved.begin(), moved.end());
+    }
+    weigh_by_residuals(at, basis, kDegrees, 0, shifts);
+    ASSERT_EQ(shifts.size(), 3u) << rank;
+    for (const double moved : shifts[2].shift) EXPECT_TRUE(rank == 0 ? moved == 0 : moved > 0) << rank;
   }
 }
 

@@ -105,6 +105,12 @@ grep -q '</html>' a/report.html || fail "report.html is not whole"
 chi=$(python3 -c 'import json; print(json.load(open("a/fit.json"))["reduced_chi_square"])')
 echo "reduced chi-square $chi"
 
+# A finger that never touches tells nothing: an answer says so.
+mkdir lifted && cp a/{footage.avi,camera.yaml,tracks.csv,track.json} lifted
+expect 0 0 'not determined: changing it changes no tracked feature' fit case.json -o lifted \
+  --set /settings/1=/colliders/finger/path/1/position/2=3 --set /settings/2=/colliders/finger/path/2/position/2=3
+[ -s lifted/fit.json ] || fail "a fit that tells nothing left no fit.json"
+
 # The other optimiser ends where the first does.
 mkdir n && cp a/{footage.avi,camera.yaml,truth.json,tracks.csv} n
 expect 0 0 '^Status: converged after [0-9]+ forward runs' fit case.json -o n --optimiser nlopt
