@@ -142,7 +142,10 @@ void weigh_by_residuals(const FitProblem::Linearised& at, const MatrixXd& basis,
   }
   SystematicShift sum;
   sum.name = kTogether;
-  sum.change = "all of these, with what the residuals say of one or the other: what the intervals have";
+  sum.change =
+      "one deviation of all of these at once, with what the residuals say of one or the other (not the root "
+      "of their "
+      "squares); intervals have 1.96 times it, beside the noise";
   set_covariance(basis * together * basis.transpose(), sum);
   shifts.push_back(std::move(sum));
 }

@@ -206,7 +206,8 @@ void add_answer(HtmlPage& page, const ReportData& data) {
     page.paragraph(
         "All else in the scene, from Poisson's ratios and relaxation to the stiffness of ligaments, bone and "
         "finger, stayed at the values that the scene gives (rhytid check SCENE --parameters lists them). The "
-        "intervals hold if those values do.");
+        "intervals hold if those values do, but for those that are named below with how well they are "
+        "known.");
   }
   page.heading("What this footage cannot tell");
   if (fit.cannot_tell.empty()) {
