@@ -52,6 +52,16 @@ TEST(Filming, MotionsAreInverted) {
   EXPECT_GT((pull.forward(pull.centre, 7) - pull.centre).norm(), 5.9);
 }
 
+/// Grey levels of a spot whose light falls off as a Gaussian, variance 100 px².
+cv::Mat bright_spot() {
+  cv::Mat spot(400, 480, CV_32F);
+  for (int y = 0; y < spot.rows; ++y)
+    for (int x = 0; x < spot.cols; ++x)
+      spot.at<float>(y, x) = static_cast<float>(
+          255 * std::pow(std::exp(-((x - 240.) * (x - 240.) + (y - 200.) * (y - 200.)) / 200.), 1 / kGamma));
+  return spot;
+}
+
 /// Centre of mass of a bright spot.
 Vec2 centroid(const cv::Mat& levels) {
   cv::Mat light;
@@ -62,12 +72,7 @@ Vec2 centroid(const cv::Mat& levels) {
 
 // The time of a frame is the middle of its exposure, whatever its length: an even motion puts the mean there.
 TEST(Filming, TimeIsTheMiddleOfTheExposure) {
-  cv::Mat spot(400, 480, CV_32F);
-  for (int y = 0; y < spot.rows; ++y)
-    for (int x = 0; x < spot.cols; ++x)
-      spot.at<float>(y, x) = static_cast<float>(
-          255 * std::pow(std::exp(-((x - 240.) * (x - 240.) + (y - 200.) * (y - 200.)) / 200.), 1 / kGamma));
-  const auto skin = make_plane_skin(spot, 2, kSize, 9, kInner);
+  const auto skin = make_plane_skin(bright_spot(), 2, kSize, 9, kInner);
   Filming f = filming("head_5_open_1");
   f.head.turn = f.head.zoom = 0;
   f.head.period = 1000;  // even, but for the pull
@@ -93,12 +98,7 @@ double spread(const cv::Mat& levels) {
 
 // A point that moves by v draws a line of e v, whose mean square is e²v²/12.
 TEST(Filming, LinesHaveTheirLength) {
-  cv::Mat spot(400, 480, CV_32F);
-  for (int y = 0; y < spot.rows; ++y)
-    for (int x = 0; x < spot.cols; ++x)
-      spot.at<float>(y, x) = static_cast<float>(
-          255 * std::pow(std::exp(-((x - 240.) * (x - 240.) + (y - 200.) * (y - 200.)) / 200.), 1 / kGamma));
-  const auto skin = make_plane_skin(spot, 2, kSize, 9, kInner);
+  const auto skin = make_plane_skin(bright_spot(), 2, kSize, 9, kInner);
   Filming f = filming("head_5_open_1");
   f.head.turn = f.head.zoom = 0;
   f.head.period = 1000;
